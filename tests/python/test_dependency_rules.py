@@ -12,8 +12,8 @@ PACKAGE = ROOT / "python" / "palpate"
 HEADERS = ROOT / "cpp" / "include" / "palpate"
 
 # Modules that every folder may import: the error type, what differs between systems, the checks of arguments,
-# the verdict, the HTML of a result, the names of array shapes and the compiled core.
-COMMON = {"errors", "arguments", "system", "verdict", "html_table", "_typing", "_core"}
+# the verdict, the HTML of a result, pandas, the names of array shapes and the compiled core.
+COMMON = {"errors", "arguments", "system", "verdict", "html_table", "frames", "_typing", "_core"}
 
 # Modules of the package, lowest first: a module may import the modules that are listed before it.
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]

@@ -14,6 +14,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 IMPORTED_LATE = {
     "matplotlib",
     "palpate.plotting",
+    "pandas",
     "sklearn",
     "joblib",
     "distributed",

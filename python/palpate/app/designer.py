@@ -9,11 +9,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import scipy
 
 from .._typing import Float1D
 from ..errors import InputError
+from ..frames import pd
 from ..model import Model
 from ..model.model_display import force_curves
 from ..recording import Recording

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
+from ..frames import pd
 from ..model import Model
 from ..verdict import GOOD
 from .exported import units_of

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from .._core import __version__
 from .._core.io import check_model, read_json
@@ -20,6 +19,7 @@ from .._core.model import ForceModel, Memory
 from .._typing import Float1D
 from ..arguments import holds_numbers, instance_of, path_of, shown
 from ..errors import InputError
+from ..frames import pd
 from ..recording import Source
 from ..recording.files import require_file
 from ..verdict import Verdict

@@ -6,9 +6,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from .._typing import Float1D
+from ..frames import pd
 from ..html_table import Curve, html_table
 from ..recording.units import COLUMN_SUFFIX, Unit, split_name
 from .model_file import phases_of

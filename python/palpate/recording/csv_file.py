@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
+from ..frames import pd
 from .dialect import HEAD_BYTES, NOT_STATED, Stated, cells_of_lines, not_csv, recognise, refuse_marks
 from .files import CELL_BYTES, require_memory
 from .looks import LOOK_ROWS, Look
@@ -30,11 +30,6 @@ _CHUNK_CELLS = 1 << 22
 
 _WORD_BYTES = 64
 """Memory of a word without its characters [bytes]."""
-
-_EXACT_OPTIONS: dict[str, Any] = (
-    {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
-)
-"""Options for exact conversion of numbers; newer pandas versions always convert exactly."""
 
 _TRAILING_COLUMN = "\n"
 """Name of the empty column if each row ends with a separator. A header cannot contain it."""
@@ -53,6 +48,12 @@ _CLOSING_QUOTE = re.compile(rb'(?:[^"]|"")*"(?!")')
 
 _OPENING_QUOTE = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
 """Pattern, by separator, of a quotation mark that opens a cell: it is the first character of the cell."""
+
+
+def _exact_options() -> dict[str, Any]:
+    """Returns the options for exact conversion of numbers; newer pandas versions always convert exactly."""
+    is_newer = tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1)
+    return {} if is_newer else {"float_precision": "round_trip"}
 
 
 class FileBytes(io.RawIOBase):
@@ -343,7 +344,7 @@ class CsvFile(LongTable):
                     dtype={**dtypes, **dict.fromkeys(trailing, "category")},
                     keep_default_na=False,
                     na_values={name: MISSING for name, dtype in dtypes.items() if dtype == "float64"},
-                    **_EXACT_OPTIONS,
+                    **_exact_options(),
                     chunksize=rows or max(1, _CHUNK_CELLS // len(self.names)),
                     engine="c",
                 ) as reader,

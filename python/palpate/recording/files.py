@@ -22,10 +22,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from .._core.io import follow_links
 from ..errors import InputError, shortened
+from ..frames import pd
 from ..system import create, sync
 from .table import Cells
 

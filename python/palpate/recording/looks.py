@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from .._typing import Float1D
+from ..frames import pd
 from .table import MISSING, Cells, parse_with
 
 LOOK_ROWS = 1000

@@ -13,11 +13,11 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from .._typing import Float1D, Int8Vector
 from ..arguments import path_of, shown
 from ..errors import InputError
+from ..frames import pd
 from .conversion import Conversion, Source, converted
 from .csv_file import CsvFile
 from .dialect import Stated
@@ -30,7 +30,7 @@ from .table import LongTable, Places
 from .units import Unit
 from .workbook import is_workbook
 
-RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
+RecordingLike: TypeAlias = "Recording | str | os.PathLike[str] | pd.DataFrame"
 """A recording, or data that can be read as one."""
 
 _CYCLE = re.compile(r"cycle (\d+)")

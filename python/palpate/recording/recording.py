@@ -11,11 +11,11 @@ from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError, listed
+from ..frames import pd
 from ..verdict import Verdict
 from .checks import quality_findings
 from .conversion import UNSTATED, Motion, Source, converted, digest_of

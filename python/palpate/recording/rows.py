@@ -7,12 +7,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from .._core.status import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError, shortened
+from ..frames import pd
 from .table import Cells, Places
 
 DIRECTION_WORDS: dict[str, int] = {

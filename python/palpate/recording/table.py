@@ -11,11 +11,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..arguments import shown
 from ..errors import InputError
+from ..frames import pd
 
 if TYPE_CHECKING:
     from .looks import Look

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
+from ..frames import pd
 from ..html_table import Curve, html_table
 from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
