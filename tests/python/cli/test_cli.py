@@ -72,10 +72,17 @@ def test_every_option_has_a_help_text() -> None:
                 assert option.help, f"{verb} {option.name} has no help"
 
 
-def test_program_help_imports_no_large_library() -> None:
+@pytest.mark.parametrize(
+    ("words", "heavy"),
+    [
+        (["--help"], {"numpy", "scipy", "pandas", "matplotlib", "pydantic"}),
+        (["plan", "--help"], {"pandas", "matplotlib", "bokeh", "pydantic"}),
+    ],
+    ids=["program", "plan"],
+)
+def test_help_imports_no_large_library(words: list[str], heavy: set[str]) -> None:
     code = (
-        "import sys; from palpate.cli.main import main; main(['--help']);"
-        "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'pydantic'};"
+        f"import sys; from palpate.cli.main import main; main({words}); heavy = {heavy};"
         "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
     )
     completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
