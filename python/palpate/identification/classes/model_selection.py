@@ -38,18 +38,12 @@ POSITION_FACTORS = (1, 2, 64)
 """Largest number of distinct positions over that of one input, with one, two, and three or more inputs [-]. A
 regular grid over many inputs has few cells along each of them, so that the rows themselves are used there."""
 
-PERIODIC_POSITION_FACTOR = 4
-"""Factor of the largest number of distinct positions of a periodic force [-]. The mean over a cell reduces a
-harmonic of order k by sinc(k / cells): by 10 % at order 264 with 1024 cells, by 0.7 % with 4096."""
-
 
 def select(rows: Rows, options: IdentifyOptions) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them."""
     rows = rows.limited()
     inputs = min(rows.box.shape[1], len(POSITION_FACTORS))
     cells = options.search.max_positions * POSITION_FACTORS[inputs - 1]
-    if options.period is not None and inputs == 1:
-        cells *= PERIODIC_POSITION_FACTOR
     found = correlated_noise(ClassSelection(rows, options, STATIC_CLASSES, cells))
     found.try_classes(DYNAMIC_CLASSES)
     return no_finer_than_repeats(found)

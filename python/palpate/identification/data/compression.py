@@ -59,6 +59,8 @@ class Compressed:
     limits: RowLimits = NO_LIMITS
     """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
     resolution of the force"""
+    scatter: float = 0.0
+    """Mean squared distance of the samples of a row from its position, along the first input"""
     cells: int = 0
     """Largest number of distinct positions; if a recording has more, its rows are gathered in this number of
     position cells"""
@@ -145,8 +147,8 @@ class Compressor:
         if side is not None:
             merged_side = _mean(group, count, weight * side)
             ds = side - merged_side[group]
+        dx = self._positions - x[group]
         if self._per_axis:
-            dx = self._positions - x[group]
             # The rows of a cell and its neighbours share one slope for all direction states, so that the
             # slopes need the same degrees of freedom in all model classes.
             block = self._pooled()
@@ -157,7 +159,8 @@ class Compressor:
             dy = _without_slopes(dy, ds[:, None], part, weight)
         within = self._within + float(dy @ (weight * dy))
         samples = float(weight.sum())
-        return Compressed(x, y, count, merged_side, within, samples, self._limits, self._cells)
+        scatter = float(weight @ dx[:, 0] ** 2) / samples
+        return Compressed(x, y, count, merged_side, within, samples, self._limits, scatter, self._cells)
 
     def _part(self, rows: NDArray[np.bool_]) -> Compressor:
         """Returns a compressor of the rows that `rows` marks with True, with the position cells of this

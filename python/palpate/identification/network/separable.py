@@ -100,11 +100,25 @@ class Block:
     channels: Float2D
     """(m, channels) factor of each network in the force of each row, multiplied by the square root of the
     row's weight"""
+    scatter: float = 0.0
+    """Mean squared distance of the samples of a row from its position"""
 
     @staticmethod
-    def weighted(positions: Float2D, force: Float1D, weight: Float1D, channels: Float2D) -> Block:
-        root = np.sqrt(weight)
-        return Block(np.ascontiguousarray(positions), root * force, root[:, None] * channels)
+    def weighted(rows: Compressed, channels: Float2D, on: NDArray[np.bool_] | slice = slice(None)) -> Block:
+        """Returns the rows `on` as a block, with their channels (m, channels)."""
+        root = np.sqrt(rows.weight[on])
+        positions = np.ascontiguousarray(rows.positions[on])
+        return Block(positions, root * rows.force[on], root[:, None] * channels, rows.scatter)
+
+    def columns(self, basis: Basis) -> Float2D:
+        """Returns the values (m, N) of all wavelets and harmonics at the rows.
+
+        The mean over samples around a position reduces a harmonic of dilation alpha by
+        exp(-alpha^2 scatter / 2), to second order in their distance from it.
+        """
+        columns = basis.columns(self.positions)
+        columns[:, basis.hats :] *= np.exp(-0.5 * self.scatter * basis.alpha[basis.hats :, 0] ** 2)
+        return columns
 
     @property
     def n_channels(self) -> int:
@@ -277,7 +291,8 @@ class SeparableProblem:
         for block in self.blocks:
             rows = len(block.target)
             chosen = np.sort(random.choice(rows, size=min(most, rows), replace=False))
-            blocks.append(Block(block.positions[chosen], block.target[chosen], block.channels[chosen]))
+            part = (block.positions[chosen], block.target[chosen], block.channels[chosen])
+            blocks.append(Block(*part, block.scatter))
         share = _weight(blocks) / _weight(self.blocks)
         samples, within = share * self.samples, share * self.within
         return replace(self, blocks=tuple(blocks), samples=samples, within=within, resolutions=())
@@ -294,7 +309,7 @@ class SeparableProblem:
         """Fits weights, slopes and biases of all channels for given wavelets."""
         tables, designs, grams = [], [], []
         for block in self.blocks:
-            design = block.design(basis.columns(block.positions))
+            design = block.design(block.columns(basis))
             gram = self._gram(block, design)
             found = solve_gram(gram, design.T @ block.target)
             tables.append(found.reshape(block.n_channels, -1))
@@ -396,17 +411,15 @@ def problem_of(
     with the channels 1 and s.
     """
     if rows.side is None:
-        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, np.ones((len(rows.force), 1)))]
+        blocks = [Block.weighted(rows, np.ones((len(rows.force), 1)))]
         readout = np.array([[1.0]])
     elif np.all(np.abs(rows.side) == 1.0) and np.unique(rows.side).size == 2:
-        blocks = [
-            Block.weighted(rows.positions[on], rows.force[on], rows.weight[on], np.ones((int(on.sum()), 1)))
-            for on in (rows.side > 0, rows.side < 0)
-        ]
+        strokes = (rows.side > 0, rows.side < 0)
+        blocks = [Block.weighted(rows, np.ones((int(on.sum()), 1)), on) for on in strokes]
         readout = np.array([[0.5, 0.5], [0.5, -0.5]])
     else:
         channels = np.column_stack([np.ones_like(rows.side), rows.side])
-        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, channels)]
+        blocks = [Block.weighted(rows, channels)]
         readout = np.eye(2)
     return SeparableProblem(
         tuple(blocks),

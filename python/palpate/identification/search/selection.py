@@ -25,8 +25,8 @@ LEAST_NEW_SHARE = 1e-5
 """Least share of the squared norm of a candidate that is orthogonal to the taken wavelets [-]: above the
 rounding error of seven digits."""
 
-CANDIDATES_AT_ONCE = 64
-"""Number of candidates whose columns are computed in one step: as many as fit into the cache of a
+CANDIDATES_AT_ONCE = 16
+"""Number of candidates whose columns are computed in one step: their values fit into the cache of a
 processor."""
 
 LEAST_DISTANCE = 1.0
@@ -57,12 +57,13 @@ class Library:
         for block in problem.blocks:
             self.columns.append(np.empty((block.n_channels, len(self), len(block.target)), np.float32))
             self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
+            pairs = block.channels.T[:, None] * block.channels.T
             for first in range(0, len(self), CANDIDATES_AT_ONCE):
                 part = slice(first, first + CANDIDATES_AT_ONCE)
                 wavelets = wavelet_columns(block.positions, self.basis.alpha[part], self.basis.beta[part])
-                weighted = wavelets.T * block.channels.T[:, None]
-                self.columns[-1][:, part] = weighted
-                self.grams[-1][:, :, part] = np.einsum("knm,lnm->kln", weighted, weighted)
+                columns = self.columns[-1][:, part]
+                np.multiply(wavelets.T, block.channels.T[:, None], out=columns, casting="same_kind")
+                self.grams[-1][:, :, part] = pairs @ wavelets**2
 
     def __len__(self) -> int:
         return len(self.basis)
@@ -114,7 +115,7 @@ class OrderLibrary:
         channel"""
         self.grams: list[Float2D] = []
         for block in problem.blocks:
-            pairs = basis.columns(block.positions).T
+            pairs = block.columns(basis).T
             columns = [pairs[part::2] * channel for channel in block.channels.T for part in (0, 1)]
             self.columns.append(np.array(columns, np.float32))
             self.grams.append(np.einsum("knm,lnm->kln", self.columns[-1], self.columns[-1], dtype=float))

@@ -89,3 +89,13 @@ def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None
     rows = np.array([[0.5, 5.5], [0.0, 6.0], [1.1, 5.5], [0.5, 4.9]])
     np.testing.assert_array_equal(inside(rows, others), [True, True, False, False])
     assert not inside(rows, others[:0]).any()
+
+
+@pytest.mark.parametrize("n", [6000, 200_000])
+def test_the_mean_over_a_cell_does_not_reduce_a_harmonic(n: int) -> None:
+    """The mean over a cell of 1/1024 of the period is 11 % below the force at its middle for order 264."""
+    x = np.random.default_rng(7).uniform(0.0, 1.0, n)
+    force = 0.3 * np.cos(2.0 * np.pi * 264.0 * x - 1.0)
+    rows = Compressor(x[:, None], force, max_positions=1024).rows()
+    found = problem_of(rows, resolved_by=5).solve(Basis.of_orders(np.array([264.0])))
+    assert np.hypot(*found.coefficients[0, 2:]) == pytest.approx(0.3, rel=0.01)
