@@ -236,10 +236,10 @@ def _fitted(
     model has it, h >= 0 imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
-    ones = np.ones_like(x)
+    one = np.ones((len(x), 1))
     hysteretic = len(wanted) == 2
     problem = SeparableProblem(
-        tuple(Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted),
+        tuple(Block(box, stroke, one) for stroke in wanted),
         np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
         samples=wanted.size,
         within=0.0,
