@@ -18,7 +18,8 @@ from ..model import Model
 from ..model.model_display import force_curves
 from ..recording import Recording
 from ..recording.units import Unit
-from ..verdict import FORCE_JND
+from ..verdict import force_jnd
+from ..verification.metrics import force_floor
 
 POSITIONS = 801
 """Number of positions of an edited curve in each stroke"""
@@ -44,7 +45,7 @@ class Curves:
 
     @cached_property
     def click(self) -> tuple[int, int] | None:
-        """Indices of peak and contact: the largest fall of the press force; None if a hand feels none."""
+        """Indices of peak and contact: the first fall of the press force that a hand feels, or None."""
         return _fall(self.press)
 
     @cached_property
@@ -81,14 +82,19 @@ class Curves:
 
 
 def _fall(force: Float1D) -> tuple[int, int] | None:
-    """Returns the indices of start and end of the largest fall of a force along its positions.
+    """Returns the indices of start and end of the first fall of a force along its positions that a hand feels.
 
-    None if a hand does not feel it: it must exceed the just noticeable difference of the force at its start.
+    Force and fall are at least just noticeable. The fall ends where the force is least before it exceeds its
+    start. None without such a fall.
     """
-    highest = np.maximum.accumulate(force)
-    end = int(np.argmax(highest - force))
-    start = int(np.argmax(force[: end + 1]))
-    return (start, end) if force[start] - force[end] > FORCE_JND * abs(force[start]) else None
+    highest, floor = np.maximum.accumulate(force), force_floor(force)
+    felt = (highest > floor) & (highest - force > force_jnd(highest, floor))
+    if not felt.any():
+        return None
+    start = int(np.argmax(force[: int(np.argmax(felt)) + 1]))
+    higher = np.flatnonzero(force[start:] > force[start])
+    stop = start + int(higher[0]) if len(higher) else len(force)
+    return start, start + int(np.argmin(force[start:stop]))
 
 
 WITH_CLICK = ("peak force", "peak position", "contact force", "click travel", "stop position", "travel")

@@ -97,3 +97,11 @@ def test_an_edited_recording_keeps_the_units_of_the_file(tmp_path: Path) -> None
     np.testing.assert_allclose(read.force, made.force, atol=1e-12)
     assert read.direction is not None
     np.testing.assert_array_equal(read.direction, made.direction)
+
+
+def test_the_click_is_the_first_fall_and_not_a_larger_one_at_the_stop() -> None:
+    x = np.linspace(0.0, 4e-3, 801)
+    press = np.interp(x, [0.0, 1e-3, 2e-3, 3.6e-3, 3.61e-3, 4e-3], [0.0, 0.5, 0.4, 1.2, 0.8, 2.0])
+    found = {name: value for name, (value, _) in Curves(x, press, press).numbers().items()}
+    assert (found["peak force"], found["contact force"]) == pytest.approx((0.5, 0.4))
+    assert found["peak position"] == pytest.approx(1e-3)
