@@ -79,6 +79,7 @@ $(stamps)/build: tools/locked/build.txt tools/system_packages.sh $(moved)
 # The compiled module and the editable package: a change of a C++ source builds the module again. palpate-control is
 # built in the same folder, because it consists of the same libraries.
 $(stamps)/core: $(stamps)/build $(core_sources) $(renamed)
+	@echo "Compiling palpate: two to three minutes on two cores"
 	CMAKE_EXECUTABLE="$$(command -v cmake)" $(pip) install --quiet --no-deps --no-build-isolation -C build-dir=build/control \
 	    -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
 	$(module_names) > $(stamps)/modules
@@ -106,6 +107,8 @@ setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stam
 
 demo: $(stamps)/core
 	.venv/bin/palpate demo
+	@echo "The pictures are in demo/. Now type:  . .venv/bin/activate"
+	@echo "and then:  palpate identify demo/sample-1.csv -o knob.json --plot knob.png"
 
 # The linters and the compilers share the processors. The Python tests run last, so that their summary is at the end of
 # the output.
@@ -123,6 +126,7 @@ test-python: setup control
 control: $(stamps)/control
 	$(alone) cmake --preset control >/dev/null
 	$(alone) cmake --build --preset control
+	ln -sf ../../build/control/palpate-control .venv/bin/
 
 # The programs of the C++ tests.
 cpp-tests: setup

@@ -82,7 +82,7 @@ class Curves:
 
 
 def _fall(force: Float1D) -> tuple[int, int] | None:
-    """Returns the indices of start and end of the first fall of a force along its positions that a hand feels.
+    """Returns the indices of start and end of the first fall of a force over its positions that a hand feels.
 
     Force and fall are at least just noticeable. The fall ends where the force is least before it exceeds its
     start. None without such a fall.

@@ -366,7 +366,9 @@ class Session:
                 target = report_of(subject).write(self.folder / f"{entry.stem}.html")
             elif kind == "header":
                 model_file, target = Path(target.name), Path(f"{entry.stem}.h")
-                written = write_c_header(Request(target, model_file))
+                plan = self.plan(entry)
+                uncertified = isinstance(plan, Plan) and not plan.is_proved
+                written = write_c_header(Request(target, model_file, uncertified=uncertified))
                 if written.verdict.level == "no":
                     raise InputError(written.verdict.reasons[0])
         return File(target.name, target.read_bytes())

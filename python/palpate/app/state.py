@@ -171,11 +171,11 @@ def _words(text: str) -> list[str]:
     return words
 
 
-def commands_of(entry: Entry, reading: OptionTable, *, exports: bool) -> list[list[str]]:
+def commands_of(entry: Entry, reading: OptionTable, *, proved: bool | None) -> list[list[str]]:
     """Returns the command lines that make the files of an entry in the folder of its recording.
 
-    `reading` are the options that read a recording; the report needs them too. `exports` is True if there is
-    a plan that can be exported.
+    `reading` are the options that read a recording; the report needs them too. `proved` is True if the plan
+    has a certificate, and None without a plan that can be exported.
     """
     model, page, header = (f"{entry.stem}.{suffix}" for suffix in ("json", "html", "h"))
     commands = [["palpate", "identify", entry.file, *words_of(entry.options), "-o", model]]
@@ -184,8 +184,9 @@ def commands_of(entry: Entry, reading: OptionTable, *, exports: bool) -> list[li
         commands.append(["palpate", "plan", model, *planned, "-o", model])
     read_with = words_of(each for each in entry.options if each[0] in reading)
     commands.append(["palpate", "report", model, entry.file, *read_with, "-o", page])
-    if exports:
-        commands.append(["palpate", "export", model, "--c", "-o", header])
+    if proved is not None:
+        uncertified = [] if proved else ["--uncertified"]
+        commands.append(["palpate", "export", model, "--c", *uncertified, "-o", header])
     return commands
 
 

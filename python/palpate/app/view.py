@@ -352,10 +352,10 @@ class View:
             return ""
         has_model = isinstance(self.session.model(entry), Model)
         plan = self.session.plan(entry)
-        planned = isinstance(plan, Plan) and plan.verdict.level != "no"
+        proved = plan.is_proved if isinstance(plan, Plan) and plan.verdict.level != "no" else None
         reading = self.session.command_line.reading
-        commands = [text_of(each) for each in commands_of(entry, reading, exports=planned)]
-        return self._render("export", entry, has_model, planned, commands)
+        commands = [text_of(each) for each in commands_of(entry, reading, proved=proved)]
+        return self._render("export", entry, has_model, proved, commands)
 
     def _charts(self, entry: Entry, known: Collection[str]) -> dict[str, Any]:
         recording, model = self.session.recording(entry), self.session.model(entry)

@@ -63,7 +63,7 @@ class _PlanVerb(Verb):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--examples" in args and not ctx.resilient_parsing:
-            _list_examples(as_json="--json" in args)
+            _list_examples(as_json="--json" in args, verbose="--verbose" in args)
             ctx.exit()
         return super().parse_args(ctx, args)
 
@@ -81,8 +81,8 @@ than accepted. Then nothing is written.
 """.format("\n".join(f"  {name}: {candidate.use}" for name, candidate in CANDIDATES.items()))
 
 
-def _list_examples(*, as_json: bool) -> None:
-    """Prints every example profile with its file and its sources."""
+def _list_examples(*, as_json: bool, verbose: bool) -> None:
+    """Prints every example profile with its file and its first paragraph; `verbose` adds its sources."""
     examples = example_profiles()
     if as_json:
         print_json(
@@ -94,8 +94,10 @@ def _list_examples(*, as_json: bool) -> None:
         return
     for name, (file, sources) in examples.items():
         print_line(f"{name}  {file}")
-        for paragraph in sources:
+        for paragraph in sources if verbose else sources[:1]:
             print_paragraph(paragraph, indent="  ")
+    if not verbose:
+        print_line("--verbose states where the numbers of each profile come from.")
 
 
 @verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb, help=_HELP)

@@ -318,11 +318,16 @@ class Exported:
 def _require_certificate(certificate: Certificate | None, request: Request) -> None:
     if request.uncertified or (certificate is not None and certificate.certified):
         return
-    found = "the model has no certificate" if certificate is None else f"the plan is {certificate.verdict}"
+    if certificate is not None:
+        raise InputError(
+            "the plan is not proved, and an exported program has no energy account: choose a device on which "
+            "it is proved, or export it without a certificate with --uncertified"
+        )
     file = request.model_file or "MODEL.json"
     command = f"palpate plan {command_word(file)} --device PROFILE -o {command_word(file)}"
     raise InputError(
-        f"{found}: certify it with {command}, or export it without a certificate with --uncertified"
+        f"the model has no certificate: certify it with {command}, or export it without a certificate with "
+        "--uncertified"
     )
 
 

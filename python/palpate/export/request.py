@@ -85,10 +85,12 @@ class Request:
     def identifier(self) -> str:
         """Returns the name of the model, which is a C identifier.
 
+        Without `name` it is that of the output file, behind "model_" if that is none or a reserved word.
+
         Raises
         ------
         InputError
-            The name is not an identifier.
+            `name` is not an identifier.
         """
         if self.name is not None:
             if _IDENTIFIER.fullmatch(self.name) is None or self.name in _RESERVED:
@@ -98,9 +100,8 @@ class Request:
                 )
             return self.name
         name = re.sub(r"\W+", "_", self.output.name.split(".")[0], flags=re.ASCII).strip("_")
-        if _IDENTIFIER.fullmatch(name) is None or name in _RESERVED:
-            raise InputError(f"{self.output.name} gives no identifier of C: state the name with --name")
-        return name
+        is_valid = _IDENTIFIER.fullmatch(name) is not None and name not in _RESERVED
+        return name if is_valid else f"model_{name}"
 
     def write_text(self, text: str) -> None:
         """Writes the output; the file gets its name only when it is completely written."""

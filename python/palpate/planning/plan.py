@@ -244,6 +244,11 @@ class Plan:
             model.plan["accepted_force_error"],
         )
 
+    @property
+    def is_proved(self) -> bool:
+        """True if passivity on the device is proved: a program without the energy account may render it."""
+        return self.certificate is not None and self.certificate.certified
+
     def stored(self) -> Model:
         """Returns a copy of the identified model that contains this plan and its certificate, ready to be
         saved.

@@ -74,11 +74,34 @@ def test_the_shown_commands_make_the_same_files(
     for file in made[2:]:
         (folder / file.name).write_bytes(file.content)
     monkeypatch.chdir(folder)
-    for command in commands_of(entry, CommandLine.reading, exports=bool(entry.device)):
+    for command in commands_of(entry, CommandLine.reading, proved=True if entry.device else None):
         if command[1] != "report":
             assert main(shlex.split(text_of(command))[1:]) < 2, command
     for file in made:
         assert (folder / file.name).read_bytes() == file.content, file.name
+
+
+def test_the_header_of_a_plan_that_is_not_proved_is_exported_as_such(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.linspace(0.0, 4.0, 200)
+    force = np.interp(x, [0.0, 1.0, 1.1, 3.0, 4.0], [0.0, 2.0, 0.8, 1.2, 8.0])
+    rows = "\n".join(f"{a:.4f},{b:.5f}" for a, b in zip(x, force, strict=True))
+    content = f"travel_mm,force_N\n{rows}\n".encode()
+    session.add_file("switch.csv", content)
+    session.act("identify", {})
+    session.act("device", {"device": "voice-coil"})
+    made = session.exported("header")
+    parts = View(session).answer((), "")["parts"]
+    assert "nothing is proved about it" in parts["export"]
+    (tmp_path / "commands").mkdir()
+    monkeypatch.chdir(tmp_path / "commands")
+    Path("switch.csv").write_bytes(content)
+    for command in commands_of(session.entry, CommandLine.reading, proved=False):
+        if command[1] != "report":
+            assert f"palpate {command[1]}" in parts["export"]
+            assert main(shlex.split(text_of(command))[1:]) < 2, command
+    assert Path("switch.h").read_bytes() == made.content
 
 
 def test_left_out_rows_are_those_of_both_options(session: Session) -> None:

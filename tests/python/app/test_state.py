@@ -61,7 +61,7 @@ def test_the_page_cannot_set_options_that_name_files_or_other_machines(flag: str
 def test_the_commands_contain_the_options_and_the_changed_profile() -> None:
     options = (("--period", "15deg"), ("--leave-out", "1:2"))
     entry = Entry("my knob.csv", options, device="bench-knob", changes=(("viscous_damping", 0.1),))
-    assert [text_of(each) for each in commands_of(entry, CommandLine.reading, exports=True)] == [
+    assert [text_of(each) for each in commands_of(entry, CommandLine.reading, proved=True)] == [
         "palpate identify 'my knob.csv' --period 15deg --leave-out 1:2 -o 'my knob.json'",
         "palpate plan 'my knob.json' --device 'my knob-bench-knob.toml' -o 'my knob.json'",
         "palpate report 'my knob.json' 'my knob.csv' --leave-out 1:2 -o 'my knob.html'",
