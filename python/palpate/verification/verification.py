@@ -143,7 +143,7 @@ class Verification:
         band = {} if self.within_band is None else {"band": f"{self.within_band:.1%} of the rows are inside"}
         return {
             "error": f"RMS {force_unit.text(self.rmse)}, NRMSE {self.nrmse:.4g}",
-            "largest": f"{force_unit.text(self.worst)} at position {position}",
+            "largest": f"{force_unit.text(self.worst)} in one row, at position {position}",
             "felt": most_noticed(self.strokes).noticed(position_unit, force_unit),
             **band,
             "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",

@@ -89,7 +89,7 @@ def test_a_summary_uses_the_units_of_the_file(here: Path, capsys: pytest.Capture
     lines = dict(line.split("  ", 1) for line in printed(SUMMARIES["verify"], capsys)[1:] if "  " in line[1:])
     rms = verify(load_model("dome-model.json"), read_recording("dome.csv")).rmse
     assert lines["error"].strip().startswith(f"RMS {rms / (1e-3 * GRAVITY):.4g} gf, ")
-    assert re.search(r" gf at position \S+ mm", lines["largest"])
+    assert re.search(r" gf in one row, at position \S+ mm", lines["largest"])
     identified = "\n".join(printed(SUMMARIES["identify"], capsys))
     assert re.search(r"error +RMS \S+ gf, ", identified)
 
