@@ -274,7 +274,7 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
 
 
 @needs_control
-def test_a_run_that_ends_before_the_page_asks_is_shown(app: App, recording: Path) -> None:
+def test_the_page_shows_a_run_that_ended_between_two_requests(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
     app.click("#identify")
     app.after(app.page.choose, "device", "bench-knob")

@@ -88,10 +88,10 @@ def _fall(force: Float1D) -> tuple[int, int] | None:
     start. None without such a fall.
     """
     highest, floor = np.maximum.accumulate(force), force_floor(force)
-    felt = (highest > floor) & (highest - force > force_jnd(highest, floor))
-    if not felt.any():
+    noticed = (highest > floor) & (highest - force > force_jnd(highest, floor))
+    if not noticed.any():
         return None
-    start = int(np.argmax(force[: int(np.argmax(felt)) + 1]))
+    start = int(np.argmax(force[: int(np.argmax(noticed)) + 1]))
     higher = np.flatnonzero(force[start:] > force[start])
     stop = start + int(higher[0]) if len(higher) else len(force)
     return start, start + int(np.argmin(force[start:stop]))

@@ -152,7 +152,7 @@ class Server:
         return {"refused": ""}
 
     def identification_stopped(self) -> dict[str, str]:
-        """Stops a running identification; the request that waits for it tells the page."""
+        """Stops a running identification; the request that waits for it answers the page."""
         self.session.command_line.stop_identification()
         return {}
 

@@ -155,7 +155,7 @@ def test_a_download_that_cannot_be_made_is_refused_with_a_sentence(served: Serve
 
 
 class Impatient(CommandLine):
-    """Stops an identification as soon as it reports its progress, a given number of times."""
+    """Stops an identification at its first report of progress, a given number of times."""
 
     stops = 1
 
