@@ -41,9 +41,7 @@ class Moteus(CanMotor):
     fault: int = 0
 
     def is_command(self, frame: bytes) -> bool:
-        return (
-            len(frame) == CAN_FD.size and CAN_FD.unpack(frame)[0] & ~EXTENDED & 0x7FFF == self.number
-        )
+        return len(frame) == CAN_FD.size and CAN_FD.unpack(frame)[0] & ~EXTENDED & 0x7FFF == self.number
 
     def obeyed(self, frame: bytes) -> bytes:
         _, length, _, data = CAN_FD.unpack(frame)

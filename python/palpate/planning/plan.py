@@ -35,6 +35,7 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..html_table import Curve, html_table
 from ..model import Model
+from ..model.model import COMPENSATION_KEY
 from ..model.model_file import CONTINUATIONS, certificate_record
 from ..model.steepest_slope import SteepestSlope
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
@@ -220,7 +221,15 @@ class Plan:
 
         The verdict is "no" if the certificate is refused, or if the force error exceeds its accepted limit.
         """
-        return Verdict((*self._certificate_findings(), *self._force_findings()))
+        return Verdict(
+            (*self._certificate_findings(), *self._force_findings(), *self._compensation_findings())
+        )
+
+    @property
+    def scale(self) -> float | None:
+        """Share of the cogging of a motor that the plan cancels, at most 1; None for another object."""
+        scale = self.model.notes.get(COMPENSATION_KEY)
+        return float(scale) if isinstance(scale, (int, float)) else None
 
     @classmethod
     def of(cls, model: Model) -> Plan:
@@ -317,6 +326,8 @@ class Plan:
         rows["force error"] = self.force_error_text
         if self.model.period is None and self.model.dimension == 1:
             rows["below contact"] = f"the force {CONTINUATIONS[self.model.below]}"
+        if self.scale is not None:
+            rows["compensation"] = f"{_percent(self.scale)} of the cogging, friction not included"
         rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
@@ -517,6 +528,14 @@ class Plan:
             else ""
         )
         return (no(f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}{accept}"),)
+
+    def _compensation_findings(self) -> tuple[Finding, ...]:
+        """Returns a finding if a device can cancel only a part of the cogging."""
+        if self.scale is None or self.scale == 1.0 or self.certificate is None or self.certificate.refused:
+            return ()
+        cure = f". The whole {self.needs}" if self.needs else ""
+        share = _percent(self.scale)
+        return (usable(f"{share} of the cogging is compensated, the most that is proved{cure}"),)
 
 
 def describe(scheme: Scheme) -> str:

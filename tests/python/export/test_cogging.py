@@ -135,13 +135,13 @@ def test_odrive_table_reaches_the_least_ripple_of_held_entries(
     text, numbers = exported(tmp_path, capsys, motor(), "--cogging", "odrive")
     k, size = np.array([(order, amplitude) for order, (amplitude, _) in ORDERS.items()]).T
     least = math.sqrt(size**2 @ (1.0 - np.sinc(k / 3600) ** 2) / 2.0)
-    assert numbers["least_rms_error"] == pytest.approx(least, rel=1e-3)
+    assert numbers["least_rms_ripple"] == pytest.approx(least, rel=1e-3)
     turns = (np.arange(72_000) + 0.5) / 72_000
     held = np.array([float(line) for line in text.splitlines()])
     left = cogging(TURN * turns) - held[np.floor(turns * 3600).astype(int)]
     ripple = math.sqrt(np.mean(left**2))
     assert 0.99 * least < ripple < 1.1 * least
-    assert numbers["rms_error"] == pytest.approx(ripple, rel=0.02)
+    assert numbers["rms_ripple"] == pytest.approx(ripple, rel=0.02)
     # A table of torques at the angles, as the calibration of the firmware makes it, leaves twice as much
     sampled = cogging(TURN * turns) - cogging(TURN * np.floor(turns * 3600) / 3600)
     assert math.sqrt(np.mean(sampled**2)) > 1.9 * ripple
