@@ -3,8 +3,8 @@
 
     python tests/python/moteus_controller.py BUS.sock
 
-The controller has the number 1 and servo.pid_position.kp = 4. It is written from docs/protocol of mjbots/moteus,
-without palpate: subframes of int8 and float registers over CAN FD.
+The controller has the number 1 and servo.pid_position.kp = 4. It is written from docs/protocol of
+mjbots/moteus, without palpate: subframes of int8 and float registers over CAN FD.
 """
 
 from __future__ import annotations

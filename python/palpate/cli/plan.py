@@ -24,8 +24,8 @@ from ..planning import (
     profile_file,
     ripple_left,
 )
-from ..planning.candidates import CANDIDATES
 from ..planning import compensate as compensation_plan
+from ..planning.candidates import CANDIDATES
 from ..planning.plan import PLAN_WORDS
 from ..planning.search import plan as choose
 from ..recording import read_recording

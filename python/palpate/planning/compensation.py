@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compensation of the cogging of a motor: the negative of its force, with the largest scale that is proved."""
+"""Compensation of the cogging of a motor: its negative force, with the largest scale that is proved."""
 
 from __future__ import annotations
 
