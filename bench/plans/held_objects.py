@@ -188,7 +188,9 @@ def tables(pairs: Sequence[Pair], curves: Sequence[Curve]) -> dict[str, str]:
     for device in dict.fromkeys(pair.device for pair in pairs):
         for law in ("object", "press curve"):
             of = [pair for pair in pairs if (pair.device, pair.law) == (device, law)]
-            rows.append((device, law, *(f"{sum(getattr(p, n) for p in of)} of {len(of)}" for n in ("hold", "line"))))
+            rows.append(
+                (device, law, *(f"{sum(getattr(p, n) for p in of)} of {len(of)}" for n in ("hold", "line")))
+            )
 
     def with_ratio(value: float, curve: Curve) -> str:
         return f"{number(value)} (×{value / curve.hold:.2g})" if curve.hold else number(value)

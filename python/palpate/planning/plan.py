@@ -381,6 +381,8 @@ class Plan:
             rows["prediction"] = f"half a sample ahead, from the previous {samples}"
         if scheme.line is not None:
             rows["held line"] = self._line_text(scheme.line)
+            if self.certificate is not None:
+                rows["lost command"] = self._lost_command_text()
         if scheme.play_radius:
             rows["play radius"] = self._play_text(units["position"])
         return rows
@@ -407,6 +409,21 @@ class Plan:
         return (
             f"{words}; up to {line.motion / device.period_s:.4g}{units['position']}/s, a faster motion ends "
             f"the run and gives at most {fast_motion_energy(device):.3g} J"
+        )
+
+    def _lost_command_text(self) -> str:
+        """Returns the largest energy that a hand takes after a lost command, which ends a certified run, in
+        words."""
+        assert self.certificate is not None
+        device = self.certificate.device
+        watchdog_s = None if device.held_line is None else device.held_line.watchdog_s
+        if watchdog_s is None:
+            return "without a watchdog of the controller the last line stays, and no energy is stated"
+        # The last line stays for the time of the watchdog in place of a period
+        until = DeviceProfile(**device.to_dict() | {"period_s": watchdog_s, "jitter_s": 0.0})
+        return (
+            f"ends the run; the watchdog ends the line after {1e3 * watchdog_s:g} ms, and a hand takes at most "
+            f"{fast_motion_energy(until):.3g} J"
         )
 
     def _units(self) -> dict[str, str]:
