@@ -422,8 +422,8 @@ class Plan:
         # The last line stays for the time of the watchdog in place of a period
         until = DeviceProfile(**device.to_dict() | {"period_s": watchdog_s, "jitter_s": 0.0})
         return (
-            f"ends the run; the watchdog ends the line after {1e3 * watchdog_s:g} ms, and a hand takes at most "
-            f"{fast_motion_energy(until):.3g} J"
+            f"ends the run; the watchdog ends the line after {1e3 * watchdog_s:g} ms, and a hand takes at "
+            f"most {fast_motion_energy(until):.3g} J"
         )
 
     def _units(self) -> dict[str, str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Certified held lines on emulated CAN drives: plan, rendering, recording, identification, and their faults."""
+"""Certified held lines on emulated CAN drives: plan, rendering, recording, identification, and faults."""
 
 from __future__ import annotations
 

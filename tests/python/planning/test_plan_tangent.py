@@ -74,7 +74,7 @@ def test_the_plan_states_slope_and_largest_speed_of_the_line() -> None:
 
 def test_the_plan_states_the_energy_after_a_lost_command() -> None:
     device = DeviceProfile.load(example_profiles()["moteus-r4"][0])
-    row = plan(model_by_hand(linear=[2.0]), device).settings()["lost command"]
+    row = plan(model_by_hand(alpha=[[8.0]], weight=[0.02]), device).settings()["lost command"]
     # (t_w + t_d) (F_max - f_c)^2 / 4 b of docs/certificate.md
     energy = (0.02 + 1.16e-3) * (1.5 - 0.01) ** 2 / (4.0 * 2e-3)
     assert f"after 20 ms, and a hand takes at most {energy:.3g} J" in row
