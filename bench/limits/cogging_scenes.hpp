@@ -99,8 +99,7 @@ struct CoggingScene {
     }
     Scheme direct;
     direct.structure = StructureKind::Direct;
-    AnyStructure structure =
-        make_structure(model, direct, scene.device.period_s, scene.device.force_limit);
+    AnyStructure structure = make_structure(model, direct, scene.device.period_s, scene.device.force_limit);
     const ForceLimit limit{scene.device.force_limit};
     for (int k = 0; k < nodes; ++k) {
         const double x = middle + width * (static_cast<double>(k) / (nodes - 1) - 0.5);

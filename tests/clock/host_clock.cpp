@@ -371,8 +371,8 @@ int poll(pollfd* files, nfds_t count, int timeout_ms) {
     return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
 }
 
-/// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. Without an
-/// answer for a second of real time there is none, and the virtual time of the wait passes.
+/// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. If none
+/// arrives within a second of real time, the virtual time of the wait passes.
 int ppoll(pollfd* files, nfds_t count, const timespec* timeout, const sigset_t* mask) {
     if (!is_virtual() || timeout == nullptr) {
         return REAL(ppoll)(files, count, timeout, mask);

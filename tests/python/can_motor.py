@@ -122,7 +122,7 @@ class CanMotor(ABC):
         """Takes a command and returns the answer with the state before it."""
 
     def other(self, frame: bytes) -> list[bytes]:
-        """Returns the answers to a frame that is no command."""
+        """Returns the answers to a frame that is not a command."""
         del frame
         return []
 

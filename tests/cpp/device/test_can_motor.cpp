@@ -156,7 +156,7 @@ TYPED_TEST(CanMotorOf, ReadsPositionVelocityTorqueDelayAndStatus) {
     EXPECT_EQ(motor.exchange({1.0}).status, Status::Fault);
 }
 
-TYPED_TEST(CanMotorOf, APauseBetweenOpeningAndTheFirstTickIsNoDelayOfAForce) {
+TYPED_TEST(CanMotorOf, ThePauseBeforeTheFirstTickIsNotADelayOfAForce) {
     auto motor = TypeParam{}.motor();
     ASSERT_TRUE(motor.open());
     std::this_thread::sleep_for(std::chrono::milliseconds{20});

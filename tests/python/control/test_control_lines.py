@@ -63,7 +63,7 @@ def test_a_planned_line_is_rendered_recorded_and_identified_again(
     found = Plan.of(load_model(planned))
     assert found.structure == "tangent"
     assert found.refused[0].startswith("direct: viscous damping")
-    record = tmp_path / "felt.csv"
+    record = tmp_path / "rendered.csv"
     drive = made(kind)
     ran = run_on(kind, planned, drive, "--duration-s", 4, "--record", record)
     assert ran.returncode == 0, ran.stderr
@@ -74,14 +74,14 @@ def test_a_planned_line_is_rendered_recorded_and_identified_again(
     assert drive.watchdog_s == pytest.approx(WATCHDOG_S)
     assert not drive.enabled
     rows = every_row(record)
-    felt = rows[rows["time_s"] > 0.5]
+    settled = rows[rows["time_s"] > 0.5]
     # The drive holds the line, so its torque belongs to the position at the same time
-    error = felt["applied_Nm"] - spring().force(felt["position_rad"].to_numpy())
+    error = settled["applied_Nm"] - spring().force(settled["position_rad"].to_numpy())
     assert np.sqrt(np.mean(error**2)) < 5e-3
-    assert np.ptp(felt["position_rad"]) > 0.1
+    assert np.ptp(settled["position_rad"]) > 0.1
     recording = read_recording(record, force="applied_Nm")
     again = identify(recording, inputs="position")
-    x = np.linspace(felt["position_rad"].min(), felt["position_rad"].max(), 100)
+    x = np.linspace(settled["position_rad"].min(), settled["position_rad"].max(), 100)
     assert np.abs(again.force(x) - spring().force(x)).max() < 0.02 * np.ptp(spring().force(x))
     assert verify(again, recording).verdict.level != "no"
 
@@ -113,7 +113,7 @@ def test_a_lost_frame_ends_a_certified_run_and_the_line(kind: str, planned: Path
 
 
 @pytest.mark.parametrize("lost", [3, 5])
-def test_a_hand_takes_no_more_than_the_stated_energy_after_lost_commands(
+def test_a_hand_takes_at_most_the_stated_energy_after_lost_commands(
     kind: str, planned: Path, lost: int
 ) -> None:
     at = 700

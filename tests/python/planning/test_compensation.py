@@ -152,7 +152,7 @@ def test_the_ripple_of_a_fresh_recording_is_the_part_that_is_not_cancelled() -> 
         (motor(notes={"compensation": 0.5}), "moteus-r4", "the model is a compensation already"),
     ],
 )
-def test_an_object_that_is_no_cogging_is_refused(model: Model, device: str, sentence: str) -> None:
+def test_an_object_that_is_not_a_cogging_is_refused(model: Model, device: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         compensate(model, device)
 
@@ -176,7 +176,7 @@ def test_the_plan_states_scale_ripple_and_friction(
     found = json.loads(capsys.readouterr().out)["compensation"]
     assert found["scale"] == scale
     assert found["ripple"]["left_rms"] == pytest.approx((1.0 - scale) * SIZE / math.sqrt(2.0), rel=5e-3)
-    # The compensation is rendered as any plan, and is no cogging that a table could cancel
+    # The compensation is rendered as any plan, and a table cannot cancel it
     assert main(["simulate", str(output), "--device", "vesc", "--duration-s", "0.5"]) in (0, 1)
     capsys.readouterr()
     assert main(["export", str(output), "--cogging", "table", "-o", str(tmp_path / "t.csv")]) == 2

@@ -222,7 +222,8 @@ class CanMotor {
                 : Protocol::disable_frame(settings_);
         const Nanoseconds sent = monotonic_now();
         if (late_from_ == 0) {
-            late_from_ = sent;  // the state from opening makes no force, however long the loop begins after it
+            late_from_ =
+                sent;  // the state from opening makes no force, however long the loop begins after it
         }
         const Sent result = bus_.send(frame);
         if (result != Sent::Yes) {
