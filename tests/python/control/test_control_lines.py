@@ -17,7 +17,7 @@ from models_by_hand import model_by_hand
 from moteus_controller import Moteus
 from palpate import DeviceProfile, Model, Plan, identify, load_model, plan, read_recording, verify
 from palpate._core.stability import fast_motion_energy
-from palpate.planning import example_profiles
+from palpate.planning import HeldLine, example_profiles
 
 pytestmark = needs_program
 
@@ -27,7 +27,16 @@ KINDS: dict[str, tuple[type[CanMotor], str, str]] = {
 }
 """Adapter -> emulated drive, example profile, name of the device"""
 
-WATCHDOG_S = 0.02
+WATCHDOG_S = 0.03
+"""Watchdog of the certificates, which is not the default of the adapters"""
+
+
+def profile(kind: str) -> DeviceProfile:
+    """Returns the example profile with this watchdog."""
+    device = DeviceProfile.load(example_profiles()[KINDS[kind][1]][0])
+    assert device.held_line is not None
+    loop = HeldLine(**device.held_line.to_dict() | {"watchdog_s": WATCHDOG_S})
+    return DeviceProfile(**device.to_dict() | {"held_line": loop})
 
 
 def spring() -> Model:
@@ -42,7 +51,7 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def planned(kind: str, tmp_path: Path) -> Path:
-    return plan(spring(), KINDS[kind][1]).stored().save(tmp_path / "planned.json")
+    return plan(spring(), profile(kind)).stored().save(tmp_path / "planned.json")
 
 
 def run_on(kind: str, planned: Path, drive: CanMotor, *options: object) -> Any:
@@ -121,10 +130,7 @@ def test_a_hand_takes_at_most_the_stated_energy_after_lost_commands(
     drive = made(kind, lost=set(range(at, at + lost)), jolt=(at, -3.0))
     ran = run_on(kind, planned, drive, "--duration-s", 4)
     assert ran.returncode == 1
-    device = DeviceProfile.load(example_profiles()[KINDS[kind][1]][0])
-    until_watchdog = DeviceProfile(
-        **device.to_dict() | {"period_s": WATCHDOG_S, "jitter_s": 0.0, "inertia": 1.0}
-    )
+    until_watchdog = DeviceProfile(**profile(kind).to_dict() | {"period_s": WATCHDOG_S, "jitter_s": 0.0})
     # Nothing reaches the drive after a run that ends while all commands are lost
     for _ in range(round(1000 * WATCHDOG_S) + 1):
         drive.step()

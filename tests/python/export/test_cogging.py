@@ -4,6 +4,7 @@
 import json
 import math
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +71,14 @@ def moteus_current(text: str, turns: float) -> float:
     return float((table[right] * scale - table[left] * scale) * fraction + table[left] * scale)
 
 
+@cache
+def odrive_map(text: str) -> list[np.float32]:
+    return [np.float32(line) for line in text.splitlines()]
+
+
 def odrive_torque(text: str, turns: float) -> float:
     """Returns the torque [N*m] that an ODrive adds at a position in revolutions."""
-    cogging_map = [np.float32(line) for line in text.splitlines()]
+    cogging_map = odrive_map(text)
     assert len(cogging_map) == 3600
     return float(cogging_map[math.trunc(turns / (1.0 / 3600.0) + math.copysign(1e-9, turns)) % 3600])
 
@@ -137,8 +143,7 @@ def test_odrive_table_reaches_the_least_ripple_of_held_entries(
     least = math.sqrt(size**2 @ (1.0 - np.sinc(k / 3600) ** 2) / 2.0)
     assert numbers["least_rms_ripple"] == pytest.approx(least, rel=1e-3)
     turns = (np.arange(72_000) + 0.5) / 72_000
-    held = np.array([float(line) for line in text.splitlines()])
-    left = cogging(TURN * turns) - held[np.floor(turns * 3600).astype(int)]
+    left = cogging(TURN * turns) - np.array([odrive_torque(text, each) for each in turns])
     ripple = math.sqrt(np.mean(left**2))
     assert 0.99 * least < ripple < 1.1 * least
     assert numbers["rms_ripple"] == pytest.approx(ripple, rel=0.02)
