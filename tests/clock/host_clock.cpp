@@ -12,6 +12,7 @@
 #include <linux/futex.h>
 #include <poll.h>
 #include <pthread.h>
+#include <signal.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/mman.h>
@@ -368,6 +369,20 @@ int poll(pollfd* files, nfds_t count, int timeout_ms) {
         return REAL(poll)(files, count, timeout_ms);
     }
     return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
+}
+
+/// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. If none
+/// arrives within a second of real time, the virtual time of the wait passes.
+int ppoll(pollfd* files, nfds_t count, const timespec* timeout, const sigset_t* mask) {
+    if (!is_virtual() || timeout == nullptr) {
+        return REAL(ppoll)(files, count, timeout, mask);
+    }
+    constexpr timespec patience{1, 0};
+    const int ready = REAL(ppoll)(files, count, &patience, mask);
+    if (ready == 0) {
+        HostClock::get().sleep(of(*timeout) + now);
+    }
+    return ready;
 }
 
 int epoll_wait(int set, epoll_event* events, int most, int timeout_ms) {

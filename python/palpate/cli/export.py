@@ -48,7 +48,7 @@ FORMATS = {
     "cogging": (
         "cogging",
         "The table of a motor controller against the cogging of its motor.",
-        {"source", "cogging", "unit_force", "encoder_zero", "accept_model"},
+        {"source", "cogging", "unit_force", "encoder_zero", "scale", "accept_model"},
     ),
     "knots": ("knots", "A curve of NUMBER knots, as pedals use it.", {"source", "knots", "accept_model"}),
 }
@@ -141,6 +141,13 @@ def _require_use(kind: str) -> None:
     metavar="RAD",
     help="Position of the model at zero of the controller's encoder, for a table against cogging.",
 )
+@click.option(
+    "--scale",
+    type=float,
+    default=1.0,
+    metavar="SHARE",
+    help="Share of the cogging that the table cancels; palpate plan --compensate states the largest proved.",
+)
 @accept_model_option
 @json_option
 @reading_options
@@ -157,6 +164,7 @@ def export(
     knots: int | None,
     unit_force: float | None,
     encoder_zero: float,
+    scale: float,
     accept_model: bool,
     as_json: bool,
     reading: ReadingOptions,
@@ -188,6 +196,7 @@ def export(
         cogging,
         unit_force,
         encoder_zero,
+        scale,
         knots,
     )
     with finishing():

@@ -8,14 +8,27 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from .._core.stability import Certificate
-from ..model import load_model
+from ..errors import InputError
+from ..model import Model, load_model
 from ..model.model_file import certificate_record
-from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
+from ..planning import (
+    DeviceProfile,
+    Plan,
+    Ripple,
+    example_profiles,
+    friction_of,
+    mechanical_units,
+    profile_file,
+    ripple_left,
+)
+from ..planning import compensate as compensation_plan
 from ..planning.candidates import CANDIDATES
 from ..planning.plan import PLAN_WORDS
 from ..planning.search import plan as choose
+from ..recording import read_recording
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import drawing, figure_file, source_name
@@ -170,6 +183,19 @@ def _list_examples(*, as_json: bool, verbose: bool) -> None:
     show_default=False,
     help="Choose proved slopes only, not steeper ones that the energy account holds.",
 )
+@click.option(
+    "--compensate",
+    is_flag=True,
+    help="Cancel the cogging of a motor: plan its negative, with the largest scale that is proved.",
+)
+@click.option(
+    "--fresh",
+    type=PATH,
+    metavar="RECORDING",
+    default=None,
+    show_default=False,
+    help="Fresh recording of the motor, whose remaining ripple --compensate prints.",
+)
 @accept_model_option
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
@@ -184,6 +210,8 @@ def plan(
     model_file: Path,
     device: str,
     output: Path | None,
+    compensate: bool,
+    fresh: Path | None,
     accept_model: bool,
     plot: Path | None,
     as_json: bool,
@@ -196,11 +224,17 @@ def plan(
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
     require_writable(output, plot, inputs=(profile_path,))  # the output may be the model file
+    if fresh is not None and not compensate:
+        raise InputError("--fresh is given without --compensate, which uses it: leave it out")
     model = load_model(model_file, with_plan=False).require_use(model_file, accepted=accept_model)
     profile = device_for(model, device)
     talk(f"read {model_file}: {sized(model)}; for {profile.id}, {profile_path}")
     began = time.perf_counter()
-    chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
+    if compensate:
+        chosen = _compensated(model, profile, given)
+    else:
+        chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
+    ripple = None if fresh is None else _ripple(model, chosen, fresh)
     seconds = time.perf_counter() - began
     verdict, certificate = model.verdict + chosen.verdict, chosen.certificate
     assert certificate is not None
@@ -214,13 +248,59 @@ def plan(
         write_figures()
         written = output if holds else None
         if as_json:
-            print_json(_result(chosen, verdict, certificate, written, seconds))
+            result = _result(chosen, verdict, certificate, written, seconds)
+            if compensate:
+                result["compensation"] = _compensation(model, chosen, ripple)
+            print_json(result)
         else:
             print_verdict(verdict)
-            print_numbers(_summary(chosen, certificate, profile, written))
+            rows = _summary(chosen, certificate, profile, written)
+            if compensate:
+                rows = _compensation_rows(model, chosen, ripple, fresh) | rows
+            print_numbers(rows)
             if verbose:
                 print_details([f"planned in {seconds:.1f} s", *_details(chosen, certificate)])
     end_with(verdict)
+
+
+def _compensated(model: Model, profile: DeviceProfile, given: dict[str, Any]) -> Plan:
+    """Returns the plan of the compensation, which has no other options than the controller's rate."""
+    context = click.get_current_context()
+    for param in context.command.params:
+        name = str(param.name)
+        is_given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if is_given and name in given and name != "on_device":
+            raise InputError(f"{param.opts[0]} is given, but --compensate does not use it: leave it out")
+    return compensation_plan(model, profile, on_device=given["on_device"])
+
+
+def _ripple(model: Model, plan: Plan, fresh: Path) -> Ripple:
+    """Returns the ripple of a fresh recording, before and after the compensation."""
+    assert plan.scale is not None
+    return ripple_left(model, plan.scale, read_recording(fresh))
+
+
+def _compensation_rows(model: Model, plan: Plan, ripple: Ripple | None, fresh: Path | None) -> dict[str, str]:
+    """Returns scale, remaining ripple and friction for display."""
+    assert plan.scale is not None
+    unit = model.units["force"]
+    rows = {"scale": f"{number(plan.scale)}, proved" if plan.verdict.level != "no" else "none is proved"}
+    friction = friction_of(model)
+    if ripple is not None and fresh is not None:
+        rows[f"ripple of {fresh.name}"] = (
+            f"{ripple.recorded:.3g} {unit} RMS, {ripple.left:.3g} {unit} with the compensation "
+            f"({100.0 * ripple.left / ripple.recorded:.2g} %, noise included)"
+        )
+        friction = ripple.friction
+    rows["friction"] = f"{friction:.3g} {unit}, not compensated: that would give energy"
+    return rows
+
+
+def _compensation(model: Model, plan: Plan, ripple: Ripple | None) -> dict[str, Any]:
+    """Returns scale, remaining ripple and friction for --json."""
+    found = None if ripple is None else {"recorded_rms": ripple.recorded, "left_rms": ripple.left}
+    friction = friction_of(model) if ripple is None else ripple.friction
+    return {"scale": plan.scale, "friction": friction, "ripple": found}
 
 
 _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")

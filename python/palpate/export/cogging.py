@@ -16,6 +16,8 @@ import numpy as np
 from .._typing import Float1D
 from ..errors import InputError
 from ..model import Model
+from ..model.model import COMPENSATION_KEY
+from ..planning import friction_of
 from ..verdict import GOOD
 from .exported import units_of
 from .request import Request, Written
@@ -46,6 +48,9 @@ class Table:
     """What the table contains, for display"""
     replayed: Callable[[Float1D], Float1D]
     """Returns the added torque at angles of the encoder [units of the controller]"""
+    least_ripple: float | None = None
+    """Least RMS ripple that any table of this controller leaves [units of the controller]; None: no such
+    bound is known"""
 
 
 @dataclass(frozen=True)
@@ -105,15 +110,43 @@ def _straight_lines(torque: Callable[[Float1D], Float1D]) -> Float1D:
 def _odrive(torque: Callable[[Float1D], Float1D]) -> Table:
     """Returns the 3600 torques of an ODrive, one a line. The controller holds an entry up to the next one.
 
-    Source: `Controller::update` of odriverobotics/ODrive, Firmware/MotorControl/controller.cpp, version 0.5.
+    Each entry is the mean of the torque while it is held, which leaves the least RMS ripple. Source:
+    `Controller::update` of odriverobotics/ODrive, Firmware/MotorControl/controller.cpp, version 0.5. The
+    firmware rounds the position towards zero, so that below zero an entry is held up to the one before.
     """
-    entries = torque(_angles(ODRIVE_ENTRIES)).astype(np.float32)
+    entries = _held_means(torque, ODRIVE_ENTRIES).astype(np.float32)
 
     def replayed(angle: Float1D) -> Float1D:
         place = np.fix(angle / TURN * ODRIVE_ENTRIES).astype(np.int64)
         return entries[np.mod(place, ODRIVE_ENTRIES)].astype(np.float64)
 
-    return Table("".join(f"{entry:.9g}\n" for entry in entries), f"{ODRIVE_ENTRIES} entries", replayed)
+    return Table(
+        "".join(f"{entry:.9g}\n" for entry in entries),
+        f"{ODRIVE_ENTRIES} entries, for positions >= 0",
+        replayed,
+        least_ripple=least_held_ripple(torque, ODRIVE_ENTRIES),
+    )
+
+
+def _held_means(torque: Callable[[Float1D], Float1D], entries: int) -> Float1D:
+    """Returns the mean torque from each of these angles to the next one, by Gauss's rule with 4 points."""
+    point, weight = np.polynomial.legendre.leggauss(4)
+    width = TURN / entries
+    at = _angles(entries)[:, None] + width * 0.5 * (1.0 + point)
+    return np.asarray(torque(at.ravel()).reshape(at.shape) @ weight / 2.0)
+
+
+def least_held_ripple(torque: Callable[[Float1D], Float1D], entries: int) -> float:
+    """Returns the least RMS ripple that a table leaves whose entries are held over equal angles.
+
+    The RMS of the torque T of order k with the amplitude a_k is a_k / sqrt(2), that of its means over 1 / N
+    of a revolution sinc(k / N) times as large: R^2 = sum a_k^2 (1 - sinc^2(k / N)) / 2, with sinc x =
+    sin(pi x) / (pi x). Orders from N / 2 on can leave less, because several of them share the entries.
+    """
+    samples = 1 << 14
+    share = np.abs(np.fft.rfft(torque(_angles(samples)))[1 : samples // 2]) ** 2 / samples**2
+    order = np.arange(1, samples // 2)
+    return math.sqrt(2.0 * float(share @ (1.0 - np.sinc(order / entries) ** 2)))
 
 
 def _openffboard(torque: Callable[[Float1D], Float1D]) -> Table:
@@ -173,6 +206,11 @@ def torque_of_turn(model: Model, encoder_zero: float = 0.0) -> Callable[[Float1D
         force depends on other quantities.
     """
     force_of_position(model)
+    if COMPENSATION_KEY in model.notes:
+        raise InputError(
+            "the model is a compensation already, and its table would add the cogging: export the identified "
+            f"model with --scale {model.notes[COMPENSATION_KEY]:g}"
+        )
     if units_of(model)[0] != "rad":
         raise InputError(
             f"the position is in {model.units['position']}: cogging needs an angle, so record it in rad or "
@@ -195,7 +233,9 @@ def torque_of_turn(model: Model, encoder_zero: float = 0.0) -> Callable[[Float1D
     return lambda angle: np.asarray(model.force(stretch * angle + encoder_zero, direction=side))
 
 
-def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: float = 0.0) -> Table:
+def table_of(
+    kind: str, model: Model, unit_force: float = 1.0, encoder_zero: float = 0.0, scale: float = 1.0
+) -> Table:
     """Returns the table of a controller against the cogging of a model.
 
     Parameters
@@ -208,6 +248,8 @@ def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: flo
         Force of the model for one unit of the table.
     encoder_zero : float
         Position of the model at which the encoder of the controller is at zero [rad].
+    scale : float
+        Share of the cogging that the table cancels.
 
     Raises
     ------
@@ -217,16 +259,7 @@ def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: flo
     torque = torque_of_turn(model, encoder_zero)
     if not np.any(torque(_angles(POSITIONS))):
         raise InputError("the torque of the model is zero at every angle: there is no cogging to compensate")
-    return CONTROLLERS[kind].table(lambda angle: torque(angle) / unit_force)
-
-
-def friction_of(model: Model) -> float:
-    """Returns the mean friction over a revolution: half the difference of both directions [unit of the
-    model]; 0 without hysteresis."""
-    if not model.hysteretic:
-        return 0.0
-    x = _angles(POSITIONS)
-    return float(np.mean(np.asarray(model.force(x, direction=1.0)) - model.force(x, direction=-1.0)) / 2.0)
+    return CONTROLLERS[kind].table(lambda angle: scale * torque(angle) / unit_force)
 
 
 def write(request: Request) -> Written:
@@ -236,12 +269,16 @@ def write(request: Request) -> Written:
     torque_of = torque_of_turn(model, request.encoder_zero)
     if not math.isfinite(request.encoder_zero):
         raise InputError(f"--encoder-zero is {request.encoder_zero:g}: must be a finite number")
+    if not 0.0 < request.scale <= 1.0:
+        raise InputError(f"--scale is {request.scale:g}: must be above 0 and at most 1")
     unit_force = _unit_force(model, unit, request)
-    table = table_of(kind, model, unit_force, request.encoder_zero)
-    angle = _angles(POSITIONS)
+    table = table_of(kind, model, unit_force, request.encoder_zero, request.scale)
+    angle = _angles(POSITIONS) + 0.5 * TURN / POSITIONS  # a held entry is compared over its whole angle
     torque = torque_of(angle)
-    error = unit_force * table.replayed(angle) - (torque - (torque.mean() if kind == "openffboard" else 0.0))
-    largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
+    cogging = torque - (torque.mean() if kind == "openffboard" else 0.0)
+    added = unit_force * table.replayed(angle)
+    error, left = added - request.scale * cogging, added - cogging
+    largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(left**2)))
     peak, friction = float(np.abs(torque).max()), friction_of(model)
     request.write_text(table.text)
     force = model.units["force"]
@@ -249,10 +286,28 @@ def write(request: Request) -> Written:
         "table": f"{request.output}: {kind}, {table.size}",
         "largest torque": f"{peak:.4g} {force}",
         "error of table": f"up to {largest:.3g} {force}, {100.0 * largest / peak:.2g} % of that torque",
+        **_ripple_text(rms, unit_force, table, float(np.sqrt(np.mean(torque**2))), request.scale, force),
         **({"friction": f"{friction:.4g} {force}, not in the table"} if model.hysteretic else {}),
     }
     record = {"kind": kind, "unit_force": unit_force, "largest_torque": peak, "largest_error": largest}
-    return Written(GOOD, numbers, record | {"rms_error": rms, "friction": friction})
+    held = table.least_ripple is not None and request.scale == 1.0
+    least = unit_force * table.least_ripple if held and table.least_ripple is not None else None
+    return Written(
+        GOOD, numbers, record | {"rms_ripple": rms, "least_rms_ripple": least, "friction": friction}
+    )
+
+
+def _ripple_text(
+    rms: float, unit_force: float, table: Table, cogging: float, scale: float, force: str
+) -> dict[str, str]:
+    """Returns the ripple that the table leaves, and the least ripple of its controller, for display."""
+    text = f"{rms:.3g} {force} RMS, {100.0 * rms / cogging:.2g} % of the cogging"
+    if table.least_ripple is not None and scale == 1.0:
+        least = unit_force * table.least_ripple
+        text += (
+            f"; no table of {ODRIVE_ENTRIES} held entries leaves less than {100.0 * least / cogging:.2g} %"
+        )
+    return {"ripple left": text}
 
 
 def _unit_force(model: Model, unit: str, request: Request) -> float:

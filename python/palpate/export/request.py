@@ -60,6 +60,8 @@ class Request:
     """Force for one unit of that table; None: the table has the unit of the model"""
     encoder_zero: float = 0.0
     """Position of the model at zero of the controller's encoder [rad]"""
+    scale: float = 1.0
+    """Share of the cogging that the table cancels"""
     knots: int | None = None
     """Number of knots of the curve of a pedal"""
 

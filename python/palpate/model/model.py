@@ -30,6 +30,9 @@ from .model_file import Fit, PathStep, describe, memory_record, terms_of, write_
 _HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
 
+COMPENSATION_KEY = "compensation"
+"""Key in the notes of a model file: the share of a motor's cogging that the model, its negative, cancels."""
+
 _NUMBER_ARGUMENTS = ("bias", "bias_hysteresis", "period", "play_radius")
 """Arguments of `Model` that are one number."""
 

@@ -12,6 +12,7 @@ from .._core.rendering import HeldSlope, Scheme, explicit_slope_limit
 from .._core.simulation import AccountUse, Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
+from .compensation import Ripple, compensate, friction_of, ripple_left
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, mechanical_units, profile_file
 from .plan import ACCEPTED_FORCE_ERROR, Plan, StaticForceError, describe
 from .simulation import (
@@ -42,21 +43,25 @@ __all__ = [
     "Inequality",
     "OnDevice",
     "Plan",
+    "Ripple",
     "Scheme",
     "StaticForceError",
     "TestRig",
     "compare_structures",
+    "compensate",
     "describe",
     "example_profiles",
     "explicit_slope_limit",
     "force_at",
     "force_error",
     "force_range",
+    "friction_of",
     "hand_for",
     "judge",
     "mechanical_units",
     "profile_file",
     "rig_for",
+    "ripple_left",
     "simulate",
 ]
 

@@ -35,6 +35,7 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..html_table import Curve, html_table
 from ..model import Model
+from ..model.model import COMPENSATION_KEY
 from ..model.model_file import CONTINUATIONS, certificate_record
 from ..model.steepest_slope import SteepestSlope
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
@@ -217,7 +218,15 @@ class Plan:
 
         The verdict is "no" if the certificate is refused, or if the force error exceeds its accepted limit.
         """
-        return Verdict((*self._certificate_findings(), *self._force_findings()))
+        return Verdict(
+            (*self._certificate_findings(), *self._force_findings(), *self._compensation_findings())
+        )
+
+    @property
+    def scale(self) -> float | None:
+        """Share of the cogging of a motor that the plan cancels, at most 1; None for another object."""
+        scale = self.model.notes.get(COMPENSATION_KEY)
+        return float(scale) if isinstance(scale, (int, float)) else None
 
     @classmethod
     def of(cls, model: Model) -> Plan:
@@ -319,6 +328,8 @@ class Plan:
         rows["force error"] = self.force_error_text
         if self.model.period is None and self.model.dimension == 1:
             rows["below contact"] = f"the force {CONTINUATIONS[self.model.below]}"
+        if self.scale is not None:
+            rows["compensation"] = f"{_percent(self.scale)} of the cogging, friction not included"
         rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
@@ -372,6 +383,8 @@ class Plan:
             rows["prediction"] = f"half a sample ahead, from the previous {samples}"
         if scheme.line is not None:
             rows["held line"] = self._line_text(scheme.line)
+            if self.certificate is not None:
+                rows["lost command"] = self._lost_command_text()
         if scheme.play_radius:
             rows["play radius"] = self._play_text(units["position"])
         return rows
@@ -398,6 +411,21 @@ class Plan:
         return (
             f"{words}; up to {line.motion / device.period_s:.4g}{units['position']}/s, a faster motion ends "
             f"the run and gives at most {fast_motion_energy(device):.3g} J"
+        )
+
+    def _lost_command_text(self) -> str:
+        """Returns the largest energy that a hand takes after a lost command, which ends a certified run, in
+        words."""
+        assert self.certificate is not None
+        device = self.certificate.device
+        watchdog_s = None if device.held_line is None else device.held_line.watchdog_s
+        if watchdog_s is None:
+            return "without a watchdog of the controller the last line stays, and no energy is stated"
+        # The last line stays for the time of the watchdog in place of a period
+        until = DeviceProfile(**device.to_dict() | {"period_s": watchdog_s, "jitter_s": 0.0})
+        return (
+            f"ends the run; the watchdog ends the line after {1e3 * watchdog_s:g} ms, and a hand takes at "
+            f"most {fast_motion_energy(until):.3g} J"
         )
 
     def _units(self) -> dict[str, str]:
@@ -505,6 +533,14 @@ class Plan:
             else ""
         )
         return (no(f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}{accept}"),)
+
+    def _compensation_findings(self) -> tuple[Finding, ...]:
+        """Returns a finding if a device can cancel only a part of the cogging."""
+        if self.scale is None or self.scale == 1.0 or self.certificate is None or self.certificate.refused:
+            return ()
+        cure = f". The whole {self.needs}" if self.needs else ""
+        share = _percent(self.scale)
+        return (usable(f"{share} of the cogging is compensated, the most that is proved{cure}"),)
 
 
 def describe(scheme: Scheme) -> str:

@@ -25,7 +25,7 @@ def test_page_shows_the_stored_numbers() -> None:
 def test_the_stored_walls_follow_from_the_profiles() -> None:
     content = json.loads(NUMBERS.read_text(encoding="utf-8"))
     stored = {row["device"]: row for row in content["walls"]}
-    name, device = next(each for each in held_lines.devices() if each[0] == "mit-drive")
+    name, device = next(each for each in held_lines.devices() if each[0] == "damiao-4310")
     width, speed = held_lines.WALLS[0]
     stiffest = stiffest_line_wall(device, width, speed * device.period_s)
     assert stiffest == pytest.approx(stored[name]["by_width"]["0.01 rad, 3 rad/s"], rel=1e-3)

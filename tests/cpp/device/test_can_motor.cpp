@@ -156,6 +156,15 @@ TYPED_TEST(CanMotorOf, ReadsPositionVelocityTorqueDelayAndStatus) {
     EXPECT_EQ(motor.exchange({1.0}).status, Status::Fault);
 }
 
+TYPED_TEST(CanMotorOf, ThePauseBeforeTheFirstTickIsNotADelayOfAForce) {
+    auto motor = TypeParam{}.motor();
+    ASSERT_TRUE(motor.open());
+    std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    EXPECT_LT(motor.exchange({}).delay, 0.01);
+    std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    EXPECT_GT(motor.exchange({}).delay, 0.02);
+}
+
 TYPED_TEST(CanMotorOf, LateAnswersAreCountedAndAreNotASecondMotor) {
     auto motor = TypeParam{}.motor();
     ASSERT_TRUE(motor.open());

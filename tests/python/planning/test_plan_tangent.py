@@ -72,6 +72,16 @@ def test_the_plan_states_slope_and_largest_speed_of_the_line() -> None:
     assert "ends the run and gives at most" in row
 
 
+def test_the_plan_states_the_energy_after_a_lost_command() -> None:
+    device = DeviceProfile.load(example_profiles()["moteus-r4"][0])
+    row = plan(model_by_hand(alpha=[[8.0]], weight=[0.02]), device).settings()["lost command"]
+    # (t_w + t_d) (F_max - f_c)^2 / 4 b of docs/certificate.md
+    energy = (0.02 + 1.16e-3) * (1.5 - 0.01) ** 2 / (4.0 * 2e-3)
+    assert f"after 20 ms, and a hand takes at most {energy:.3g} J" in row
+    without = plan(model_by_hand(), motor(viscous_damping=2e-3)).settings()["lost command"]
+    assert without.startswith("without a watchdog")
+
+
 def test_a_stored_line_is_read_and_checked_again(tmp_path: Path) -> None:
     planned = plan(model_by_hand(), motor(delay_s=1e-3, viscous_damping=6e-3))
     path = planned.stored().save(tmp_path / "m.json")

@@ -182,7 +182,8 @@ class CanMotor {
         if (answer.at_end) {
             return "reports a position at the end of its range: set the zero position of the drive";
         }
-        start_ = late_from_ = monotonic_now();
+        start_ = monotonic_now();
+        late_from_ = 0;
         take(answer);
         return "";
     }
@@ -220,6 +221,10 @@ class CanMotor {
                 ? Protocol::command_frame(settings_, is_alone ? command : Command{}, is_limited)
                 : Protocol::disable_frame(settings_);
         const Nanoseconds sent = monotonic_now();
+        if (late_from_ == 0) {
+            late_from_ =
+                sent;  // the state from opening makes no force, however long the loop begins after it
+        }
         const Sent result = bus_.send(frame);
         if (result != Sent::Yes) {
             ++health_.unsent;
@@ -259,7 +264,8 @@ class CanMotor {
     int allowed_late_ = 0;       ///< answers that may still arrive late
     int repeated_in_a_row_ = 0;  ///< successive exchanges with an answer without a command
     Nanoseconds start_ = 0;      ///< time of the first reading [ns]
-    Nanoseconds late_from_ = 0;  ///< earliest time of the state that the applied force does not contain [ns]
+    /// Earliest time of the state that the applied force does not contain; 0 before the first exchange [ns]
+    Nanoseconds late_from_ = 0;
     Nanoseconds oldest_unanswered_ = 0;  ///< time at which the oldest command without an answer was sent [ns]
 };
 

@@ -150,6 +150,9 @@ template <class Protocol>
         settings.torque_limit = options.force_limit.value_or(planned ? model.certificate->device.force_limit
                                                                      : settings.torque_limit);
     }
+    if (planned && model.certificate->device.held_line) {
+        settings.watchdog_s = model.certificate->device.held_line->watchdog_s.value_or(settings.watchdog_s);
+    }
     auto live = detail::live_motor<Protocol>(std::move(settings), options.loop.rate_hz);
     if (planned) {
         // A drive reports neither inertia, damping, friction nor delay: those of the certificate are used
