@@ -135,6 +135,18 @@ def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     assert "the play operator follows the positions" in result.notes[0]
 
 
+def test_the_play_operator_follows_a_motion_also_if_its_directions_are_stated() -> None:
+    """Near a turn s is not +-1: a direction column would give another force there."""
+    model = model_of(curve().source, hysteresis=True, play_radius=0.005)
+    undirected = replace(stroke(), direction=None)
+    without, stated = verify(model, undirected), verify(model, stroke())
+    assert (stated.force[-len(without.force) :] == without.force).all()
+    assert stated.n == without.n
+    mixed = np.random.default_rng(0).permutation(len(stroke()))
+    shuffled = Recording.from_arrays(stroke().position[mixed], stroke().force[mixed], direction=stroke().direction[mixed])
+    assert verify(model, shuffled).n == len(stroke())
+
+
 @pytest.mark.parametrize("timed", [False, True])
 def test_without_direction_and_play_radius_the_strokes_follow_from_the_order_of_rows(timed: bool) -> None:
     table = stroke(direction=False)

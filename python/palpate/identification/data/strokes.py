@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import ordered_strokes, turns_of
+from ...recording.motion import ordered_strokes, states_its_order, turns_of
 from ...verdict import Finding, usable
 from ..decision import Decision
 
@@ -56,9 +56,16 @@ class Strokes:
 
 
 def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
-    """Returns the directions that all recordings state; without them, whether the rows have a time."""
+    """Returns the directions that all recordings state; without them, whether the rows have a time.
+
+    Directions that the order of rows shows too belong to a motion, as those without a statement do.
+    """
     side = _all_of([recording.direction for recording in recordings])
-    return Strokes(side, in_order=side is None and all(each.time is not None for each in recordings))
+    if side is None:
+        return Strokes(in_order=all(each.time is not None for each in recordings))
+    if {-1.0, 1.0} <= set(side.tolist()) and all(map(states_its_order, recordings)):
+        return Strokes(order=side, in_order=True)
+    return Strokes(side)
 
 
 def strokes_of(recordings: Sequence[Recording]) -> Strokes:
@@ -68,7 +75,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     force of a passive object is above its release force.
     """
     stated = stated_strokes(recordings)
-    if stated.side is not None:
+    if stated.side is not None or stated.order is not None:
         return stated
     ordered = [ordered_strokes(recording) for recording in recordings]
     if stated.in_order:

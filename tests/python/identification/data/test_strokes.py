@@ -263,6 +263,22 @@ def test_the_order_of_rows_gives_the_same_model_with_and_without_time() -> None:
     assert (timed.force(at, direction=press) == ordered.force(at, direction=press)).all()
 
 
+def test_a_stated_direction_that_the_order_of_rows_shows_too_changes_no_model() -> None:
+    ordered = Recording.from_arrays(IN_AND_OUT, loop())
+    without, stated = (identify(each) for each in (ordered, replace(ordered, direction=SIDE)))
+    assert without.kind == stated.kind == "hysteresis"
+    assert stated.play_radius == without.play_radius
+    assert (stated.force(IN_AND_OUT, direction=SIDE) == without.force(IN_AND_OUT, direction=SIDE)).all()
+
+
+@pytest.mark.parametrize("of_stroke", [1, -1])
+def test_a_stated_direction_that_contradicts_the_order_of_rows_is_kept(of_stroke: int) -> None:
+    direction = np.where(SIDE == of_stroke, -SIDE, SIDE).astype(np.int8)
+    found = strokes_of([Recording.from_arrays(IN_AND_OUT, loop(), direction=direction)])
+    assert found.order is None
+    assert found.side is not None and (found.side == direction).all()
+
+
 def test_rows_with_a_stated_direction_in_another_order_are_not_followed_by_a_play_operator() -> None:
     ordered = Recording.from_arrays(IN_AND_OUT, loop())
     mixed = np.random.default_rng(0).permutation(len(IN_AND_OUT))
