@@ -92,7 +92,9 @@ def test_strokes_of_a_hysteresis_model_have_separate_errors() -> None:
 def test_strokes_that_only_the_order_of_rows_shows_have_the_same_errors() -> None:
     recording = strokes(0)
     model, undirected = palpate.identify(recording), replace(recording, direction=None)
-    stated, ordered = (uncertainty(model, each).force(GRID, np.ones(len(GRID))) for each in (recording, undirected))
+    stated, ordered = (
+        uncertainty(model, each).force(GRID, np.ones(len(GRID))) for each in (recording, undirected)
+    )
     assert ordered == pytest.approx(stated, rel=1e-6)
 
 

@@ -143,7 +143,9 @@ def test_the_play_operator_follows_a_motion_also_if_its_directions_are_stated() 
     assert (stated.force[-len(without.force) :] == without.force).all()
     assert stated.n == without.n
     mixed = np.random.default_rng(0).permutation(len(stroke()))
-    shuffled = Recording.from_arrays(stroke().position[mixed], stroke().force[mixed], direction=stroke().direction[mixed])
+    shuffled = Recording.from_arrays(
+        stroke().position[mixed], stroke().force[mixed], direction=stroke().direction[mixed]
+    )
     assert verify(model, shuffled).n == len(stroke())
 
 
