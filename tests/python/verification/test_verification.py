@@ -137,16 +137,13 @@ def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
 
 def test_the_play_operator_follows_a_motion_also_if_its_directions_are_stated() -> None:
     """Near a turn s is not +-1: a direction column would give another force there."""
-    model = model_of(curve().source, hysteresis=True, play_radius=0.005)
-    undirected = replace(stroke(), direction=None)
-    without, stated = verify(model, undirected), verify(model, stroke())
-    assert (stated.force[-len(without.force) :] == without.force).all()
-    assert stated.n == without.n
-    mixed = np.random.default_rng(0).permutation(len(stroke()))
-    shuffled = Recording.from_arrays(
-        stroke().position[mixed], stroke().force[mixed], direction=stroke().direction[mixed]
-    )
-    assert verify(model, shuffled).n == len(stroke())
+    model, recording = model_of(curve().source, hysteresis=True, play_radius=0.005), stroke()
+    without, stated = verify(model, replace(recording, direction=None)), verify(model, recording)
+    assert (stated.force == without.force).all()
+    assert recording.direction is not None
+    mixed = np.random.default_rng(0).permutation(len(recording))
+    x, force, side = (each[mixed] for each in (recording.position, recording.force, recording.direction))
+    assert verify(model, Recording.from_arrays(x, force, direction=side, units=RAD)).n == len(recording)
 
 
 @pytest.mark.parametrize("timed", [False, True])
