@@ -83,17 +83,19 @@ class Hysteresis(ModelClass):
         if data.side is not None:
             return self._of(below, HysteresisInput.of_strokes(data.side))
         play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
-        start = dict(selection.start_basis)
+        start, before = dict(selection.start_basis), list(report.decisions)
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
-            # The direction can also change at once at a turn. Its wavelets show the radius better than those
-            # without hysteresis.
+            # The direction can also change at once at a turn. Wavelets of strokes without their reversals
+            # show the radius; those of all rows would fit the reversals.
+            order = HysteresisInput(data.order, data.order != 0.0)
             settled = replace(
                 data, force=parallel_behind_turns(data.path[:, 0], data.force, data.order * data.fitted)
             )
             samples = Samples(settled, selection.options, selection.cells)
-            of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0), samples=samples)
-            basis = of_order.solution.basis
-        before, of_play, of_its_fit = list(report.decisions), None, (list[Decision](), dict(start))
+            basis = self._of(below, order, samples=samples).solution.basis
+            report.decisions[:], selection.start_basis = before, dict(start)
+            of_order, before = self._of(below, order, first=basis), list(report.decisions)
+        of_play, of_its_fit = None, (list[Decision](), dict(start))
         for strokes in play.best_of_options(basis, data.order):
             report.decisions[:], selection.start_basis = before, dict(start)
             found = self._of(below, strokes, play, first=basis)
