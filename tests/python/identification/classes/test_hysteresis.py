@@ -90,7 +90,7 @@ def test_strokes_that_turn_at_one_depth_predict_those_that_turn_at_another() -> 
     assert verify(model, tissue(2, 0.007)).nrmse < 0.01
 
 
-def test_few_rows_of_reversing_friction_are_no_steep_slope() -> None:
+def test_rows_of_reversing_friction_do_not_make_a_steep_slope() -> None:
     """The rows behind a turn, in which the friction reverses, were fitted by narrow wavelets."""
     u = np.r_[np.linspace(-0.02, 1.0, 600), np.linspace(1.0, -0.02, 600)]
     force = np.where(u > 0.0, (np.tanh(u / 0.1) + u) * (1.0 + 0.2 * state(u, 0.004, 0.0)), 0.0)
