@@ -144,6 +144,17 @@ def directions_of(recording: Recording) -> Int8Vector | None:
     return ordered_strokes(recording) if recording.direction is None else recording.direction
 
 
+def states_its_order(recording: Recording) -> bool:
+    """Returns True if the stated directions are those of the order of rows: they name each stroke as most of
+    its rows do. The rows are then in the order of a motion, which shows more than their directions."""
+    direction, ordered = recording.direction, ordered_strokes(recording)
+    if direction is None or ordered is None:
+        return False
+    stroke = np.cumsum(np.diff(ordered, prepend=0) != 0)
+    agreed = np.bincount(stroke, direction * ordered, minlength=1)
+    return bool((agreed[np.unique(stroke[ordered != 0])] > 0).all())
+
+
 def cycles_of(recording: Recording) -> list[slice]:
     """Returns the rows of each cycle of a recording: a press and the release behind it, with their holds.
 

@@ -19,7 +19,14 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import acceleration, gaps_of, ordered_strokes, turns_of, velocity
+from ..recording.motion import (
+    acceleration,
+    gaps_of,
+    ordered_strokes,
+    states_its_order,
+    turns_of,
+    velocity,
+)
 from ..recording.roles import Role, roles_of, unused_rows
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
@@ -59,13 +66,13 @@ class Prediction:
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
     """Returns the model's force along a recording.
 
-    For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
-    Without direction and play radius, the strokes follow from the order of rows, as in the identification.
-    Otherwise, the play operator follows the positions in their order. A memory follows the positions over
-    the time of the recording, from rest. The play radius is the first one available of: `play_radius`, the
-    radius of the flight record, of the model, of its plan, or 1 % of the travel. A flight record behind a
-    virtual coupling is compared at the position of the virtual object, except a compensated one. A flight
-    record with prediction is compared at the predicted position.
+    If a play radius is known, and the rows are in the order of a motion, the play operator follows their
+    positions: near a turn, s = +-1 is not the state that the model was identified with. Otherwise s = +-1 is
+    the direction of the recording, or of the order of rows; rows without direction are left out. A memory
+    follows the positions over the time of the recording, from rest. The play radius is the first one
+    available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 % of the
+    travel. A flight record behind a virtual coupling is compared at the position of the virtual object,
+    except a compensated one. A flight record with prediction is compared at the predicted position.
 
     Raises
     ------
@@ -193,7 +200,8 @@ class _State:
 
 
 def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius: float | None) -> _State:
-    if recording.direction is not None and play_radius is None:
+    followed = play_radius is not None or (_known_radius(model, flight) and states_its_order(recording))
+    if recording.direction is not None and not followed:
         rows = recording.direction != 0
         if not rows.any():
             raise InputError(
@@ -213,7 +221,7 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
     play = HysteresisInput.of_play(np.split(whole.position, _gaps(whole.time, whole.position)), radius)
     known = play.known[whole.rows]
     unit = f" {model.units['position']}" if model.units["position"] else ""
-    why = "There is no direction" if recording.direction is None else "The direction is not used"
+    why = "There is no direction" if recording.direction is None else "The direction of a row is not enough"
     notes: tuple[str, ...] = (
         f"{why}: the play operator follows the positions. Its radius is {radius:.4g}{unit}, {origin}.",
     )

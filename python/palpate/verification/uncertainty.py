@@ -79,8 +79,8 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
     Raises
     ------
     InputError
-        The model has several inputs, a mass, a damping or a memory, or hysteresis while a recording has no
-        direction; or there are not more rows than parameters.
+        The model has several inputs, a mass, a damping or a memory; or there are not more rows than
+        parameters.
     """
     if model.memory is not None:
         raise InputError("the model has a memory: standard errors need a force without memory")
@@ -90,14 +90,10 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
             "errors need position as the only input"
         )
     parts = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if model.hysteretic and any(part.direction is None for part in parts):
-        raise InputError("a recording has no direction, which the standard errors of a hysteresis model need")
     gram, squares, lagged, n = None, 0.0, 0.0, 0
     for part in parts:
         found = verify(model, part)
-        directed = model.hysteretic and part.direction is not None
-        side = part.direction[found.rows].astype(float) if directed and part.direction is not None else None
-        for block, stroke in _blocks(part.position[found.rows], side):
+        for block, stroke in _blocks(part.position[found.rows], found.prediction.side):
             jacobian = _jacobian(model, block, stroke)
             gram = jacobian.T @ jacobian if gram is None else gram + jacobian.T @ jacobian
         squares += float(found.residual @ found.residual)

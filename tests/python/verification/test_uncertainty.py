@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Standard errors equal the distance of a model from the truth if noise is the only cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,17 @@ def test_strokes_of_a_hysteresis_model_have_separate_errors() -> None:
         assert np.mean(np.abs(error) < 2.5 * known.force(GRID, stroke)) > 0.8
 
 
+def test_strokes_that_only_the_order_of_rows_shows_have_the_same_errors() -> None:
+    x, side = np.r_[np.linspace(0.0, 1.0, 800), np.linspace(1.0, 0.0, 800)], np.repeat([1, -1], 800)
+    noise = np.random.default_rng(0).normal(0.0, 0.02, len(x))
+    recording = Recording.from_arrays(x, truth(x) + 0.3 * side + noise, direction=side)
+    model, ordered = palpate.identify(recording), replace(recording, direction=None)
+    press = np.ones(len(GRID))
+    assert uncertainty(model, ordered).force(GRID, press) == pytest.approx(
+        uncertainty(model, recording).force(GRID, press), rel=1e-3
+    )
+
+
 def test_correlated_residuals_widen_the_band() -> None:
     random = np.random.default_rng(0)
     x = np.linspace(0.0, 1.0, 2000)
@@ -122,9 +135,6 @@ def test_outside_the_domain_the_error_is_that_at_its_edge() -> None:
 
 def test_unknown_standard_errors_are_refused() -> None:
     recording = strokes(0)
-    undirected = Recording.from_arrays(recording.position, recording.force)
-    with pytest.raises(InputError, match="a recording has no direction"):
-        uncertainty(palpate.identify(recording), undirected)
     X = np.random.default_rng(0).uniform(size=(200, 2))
     surface = palpate.WaveletNetworkRegressor().fit(X, X[:, 0] * X[:, 1]).network_
     with pytest.raises(InputError, match="need position as the only input"):

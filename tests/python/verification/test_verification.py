@@ -136,6 +136,17 @@ def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     assert "the play operator follows the positions" in result.notes[0]
 
 
+def test_the_play_operator_follows_a_motion_also_if_its_directions_are_stated() -> None:
+    """Near a turn s is not +-1: a direction column would give another force there."""
+    model, recording = model_of(curve().source, hysteresis=True, play_radius=0.005), stroke()
+    without, stated = verify(model, replace(recording, direction=None)), verify(model, recording)
+    assert (stated.force == without.force).all()
+    assert recording.direction is not None
+    mixed = np.random.default_rng(0).permutation(len(recording))
+    x, force, side = (each[mixed] for each in (recording.position, recording.force, recording.direction))
+    assert verify(model, Recording.from_arrays(x, force, direction=side, units=RAD)).n == len(recording)
+
+
 @pytest.mark.parametrize("timed", [False, True])
 def test_without_direction_and_play_radius_the_strokes_follow_from_the_order_of_rows(timed: bool) -> None:
     table = stroke(direction=False)

@@ -12,9 +12,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._typing import Float1D
 from ...errors import InputError
+from ...recording.motion import noise_band
 from ...verdict import usable
-from ..data.strokes import HysteresisInput
+from ..data.strokes import HysteresisInput, parallel_behind_turns
 from ..decision import Decision
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
@@ -81,16 +83,22 @@ class Hysteresis(ModelClass):
         if data.side is not None:
             return self._of(below, HysteresisInput.of_strokes(data.side))
         play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
-        start = dict(selection.start_basis)
+        start, before = dict(selection.start_basis), list(report.decisions)
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
-            # The direction can also change at once at a turn. Its wavelets show the radius better than those
-            # without hysteresis.
-            of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0))
-            basis = of_order.solution.basis
-        before, of_play, of_its_fit = list(report.decisions), None, (list[Decision](), dict(start))
-        for strokes in play.best_of_options(basis):
+            # The direction can also change at once at a turn. Wavelets of strokes without their reversals
+            # show the radius; those of all rows would fit the reversals.
+            order = HysteresisInput(data.order, data.order != 0.0)
+            settled = replace(
+                data, force=parallel_behind_turns(data.path[:, 0], data.force, data.order * data.fitted)
+            )
+            samples = Samples(settled, selection.options, selection.cells)
+            basis = self._of(below, order, samples=samples).solution.basis
             report.decisions[:], selection.start_basis = before, dict(start)
-            found = self._of(below, strokes, play)
+            of_order, before = self._of(below, order, first=basis), list(report.decisions)
+        of_play, of_its_fit = None, (list[Decision](), dict(start))
+        for strokes in play.best_of_options(basis, data.order):
+            report.decisions[:], selection.start_basis = before, dict(start)
+            found = self._of(below, strokes, play, first=basis)
             if of_play is None or self._fits_better(found, of_play):
                 of_play, of_its_fit = found, (list(report.decisions), selection.start_basis)
         # A play radius is one more number than the order of rows.
@@ -117,26 +125,30 @@ class Hysteresis(ModelClass):
             name = "bic"
         return one.on_rows(name, weight) <= other.on_rows(name, weight) + margin
 
-    def _of(self, below: Candidate, strokes: HysteresisInput, play: PlaySearch | None = None) -> Candidate:
+    def _of(
+        self,
+        below: Candidate,
+        strokes: HysteresisInput,
+        play: PlaySearch | None = None,
+        samples: Samples | None = None,
+        first: Basis | None = None,
+    ) -> Candidate:
         """Returns the better of the simpler candidate and a network with hysteresis for given direction
         states, or for those of the best play radius if `play` searches it.
 
-        A hysteresis h >= 0 has a mean, which a fit with the wavelets of the simpler candidate already shows.
+        A hysteresis h >= 0 has a mean, which a fit with the wavelets `first`, by default those of the simpler
+        candidate, already shows.
         If the criterion does not decrease with these wavelets, and the options do not name hysteresis, no
         network with hysteresis is grown.
         """
-        selection, judge, named, samples = (
-            self._selection,
-            self._selection.judge,
-            self._named,
-            self._selection.samples,
-        )
+        selection, judge, named = self._selection, self._selection.judge, self._named
+        samples, first = samples or selection.samples, below.solution.basis if first is None else first
         rows = samples.rows(strokes)
         problem = samples.problem(rows, strokes)
-        first = problem.solve(below.solution.basis)
-        free = selection.candidate(self.name, problem, first, judge.criterion, rows=rows, strokes=strokes)
+        start = problem.solve(first)
+        free = selection.candidate(self.name, problem, start, judge.criterion, rows=rows, strokes=strokes)
         if named or judge.fall(below, free) > 0.0:
-            free = self._grown(below, free, play)
+            free = self._grown(below, free, samples, play)
         if not named and not judge.accepts(below, free):
             return judge.better(below, free)
         kept = self._selection.constrained(free)
@@ -153,7 +165,9 @@ class Hysteresis(ModelClass):
         self._report_sign(best, kept, free)
         return best
 
-    def _grown(self, below: Candidate, found: Candidate, play: PlaySearch | None) -> Candidate:
+    def _grown(
+        self, below: Candidate, found: Candidate, samples: Samples, play: PlaySearch | None
+    ) -> Candidate:
         """Returns a network with hysteresis; its play radius is searched if hysteresis is accepted or the
         options name it.
 
@@ -173,9 +187,9 @@ class Hysteresis(ModelClass):
                 basis, has_start = (basis if has_start else Basis.empty(1)), True
             if complete and strokes is before:
                 break
-            rows = selection.samples.rows(strokes)
+            rows = samples.rows(strokes)
             limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
-            grown = selection.grown(selection.samples.problem(rows, strokes), basis, self.name, limit)
+            grown = selection.grown(samples.problem(rows, strokes), basis, self.name, limit)
             basis = selection.start_basis[self.name] = grown.solution.basis
             reason = grown.stop_reason
             found = selection.candidate(
@@ -258,11 +272,13 @@ class PlaySearch:
         moving = np.maximum.accumulate(np.where(data.fitted, np.arange(len(data.force)), 0))
         # A tool that waits does not move the play: noise of its position would.
         self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
+        self._noise = noise_band(data.path[:, 0])
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
+    def best_of_options(self, basis: Basis, order: Float1D | None) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given
-        wavelets is smaller than at its neighbours.
+        wavelets is smaller than at its neighbours. A radius within the noise of the position must also have a
+        smaller error than the `order` of rows (n,).
 
         Wavelets that fit the rows after a turn can make a wrong radius the best one. Returns none if the
         motions between gaps of time are too short for every play radius, or never reverse: with one stroke
@@ -271,6 +287,10 @@ class PlaySearch:
         if not self._usable:
             return []
         known = self._thinned(self._usable[-1])
+        least = math.inf
+        if order is not None:
+            known &= order != 0.0
+            least = self._residual_squares(HysteresisInput(order, known), basis, known)
         errors = [math.inf, *(self._residual_squares(each, basis, known) for each in self._usable), math.inf]
         return [
             strokes
@@ -278,6 +298,7 @@ class PlaySearch:
                 self._usable, errors, errors[1:], errors[2:], strict=False
             )
             if error <= min(before, after)
+            and (error < least or 2.0 * (strokes.play_radius or 0.0) >= self._noise)
         ]
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import ordered_strokes, turns_of
+from ...recording.motion import TURN_SHARE, ordered_strokes, states_its_order, turns_of
 from ...verdict import Finding, usable
 from ..decision import Decision
 
@@ -56,9 +56,16 @@ class Strokes:
 
 
 def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
-    """Returns the directions that all recordings state; without them, whether the rows have a time."""
+    """Returns the directions that all recordings state; without them, whether the rows have a time.
+
+    Directions that the order of rows shows too belong to a motion, as those without a statement do.
+    """
     side = _all_of([recording.direction for recording in recordings])
-    return Strokes(side, in_order=side is None and all(each.time is not None for each in recordings))
+    if side is None:
+        return Strokes(in_order=all(each.time is not None for each in recordings))
+    if {-1.0, 1.0} <= set(side.tolist()) and all(map(states_its_order, recordings)):
+        return Strokes(order=side, in_order=True)
+    return Strokes(side)
 
 
 def strokes_of(recordings: Sequence[Recording]) -> Strokes:
@@ -68,7 +75,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     force of a passive object is above its release force.
     """
     stated = stated_strokes(recordings)
-    if stated.side is not None:
+    if stated.side is not None or stated.order is not None:
         return stated
     ordered = [ordered_strokes(recording) for recording in recordings]
     if stated.in_order:
@@ -204,6 +211,41 @@ def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> 
     ways = [(bool((each > 0).any()), bool((each < 0).any())) for each in directions]
     words = {"press": (True, False), "release": (False, True), "both": (True, True)}
     return ", ".join(f"{ways.count(way)} {word}" for word, way in words.items() if ways.count(way))
+
+
+def parallel_behind_turns(path: Float1D, force: Float1D, order: Float1D) -> Float1D:
+    """Returns the forces (n,) of strokes without their reversals.
+
+    Behind a turn the friction of an object reverses over a distance, in which the force goes from that of the
+    stroke before to that of the new stroke. These rows have the new direction, but not its force. There the
+    new stroke continues parallel to the stroke before, with the difference next to the turn. The distance is
+    twice that to the middle between both strokes.
+
+    Parameters
+    ----------
+    path : (n,) array
+        Positions in recorded order [travel].
+    force : (n,) array
+    order : (n,) array
+        Direction of each row from the order of rows; 0 for rows of no stroke.
+    """
+    result, moving = force.copy(), np.flatnonzero(order)
+    strokes = np.split(moving, np.flatnonzero(np.diff(order[moving])) + 1)
+    for before, stroke in pairwise(strokes):
+        known = before[np.argsort(path[before])]
+        moved = np.abs(path[stroke] - path[before[-1]])
+        parallel = np.interp(path[stroke], path[known], force[known])
+        apart = force[stroke] - parallel
+        next_to = apart[(moved >= TURN_SHARE) & (moved < 2.0 * TURN_SHARE)]
+        loop = float(next_to.mean()) if len(next_to) else 0.0
+        if loop == 0.0 or np.ptp(path[before]) < 2.0 * TURN_SHARE:
+            continue
+        reversed_by = np.append(0.0, np.where(moved < TURN_SHARE, apart / loop, 1.0))
+        middle = int(np.argmax(reversed_by >= 0.5))
+        at, between = np.append(0.0, moved)[[middle - 1, middle]], reversed_by[[middle - 1, middle]]
+        behind = moved < 2.0 * np.interp(0.5, between, at)
+        result[stroke[behind]] = parallel[behind] + loop
+    return result
 
 
 @dataclass(frozen=True)

@@ -90,6 +90,18 @@ def test_strokes_that_turn_at_one_depth_predict_those_that_turn_at_another() -> 
     assert verify(model, tissue(2, 0.007)).nrmse < 0.01
 
 
+def test_rows_of_reversing_friction_do_not_make_a_steep_slope() -> None:
+    """The rows behind a turn, in which the friction reverses, were fitted by narrow wavelets."""
+    u = np.r_[np.linspace(-0.02, 1.0, 600), np.linspace(1.0, -0.02, 600)]
+    force = np.where(u > 0.0, (np.tanh(u / 0.1) + u) * (1.0 + 0.2 * state(u, 0.004, 0.0)), 0.0)
+    force += np.random.default_rng(0).normal(0.0, 2e-3, len(u))
+    model = identify(Recording.from_arrays(u, force))
+    at = np.linspace(0.05, 1.0, 4001)
+    for side in (1.0, -1.0):
+        slope = np.diff(model.force(at, direction=np.full(len(at), side))) / np.diff(at)
+        assert slope.max() < 15.0  # the steepest of the object is 13.2
+
+
 @pytest.mark.full
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
     """Press a little, release a little, while the mean advances: both strokes cover every position."""

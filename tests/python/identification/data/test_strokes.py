@@ -11,8 +11,9 @@ import pytest
 from any_input import SCALE
 from conftest import sampled
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
+from palpate._core.model import play
 from palpate.cli.main import main
-from palpate.identification.data.strokes import strokes_of
+from palpate.identification.data.strokes import parallel_behind_turns, strokes_of
 from palpate.recording.checks.recordings import scale_findings
 from palpate.recording.motion import strokes_from_order
 
@@ -261,6 +262,37 @@ def test_the_order_of_rows_gives_the_same_model_with_and_without_time() -> None:
     at, press = np.linspace(0.0, 4.0, 50), np.ones(50)
     assert timed.play_radius == ordered.play_radius
     assert (timed.force(at, direction=press) == ordered.force(at, direction=press)).all()
+
+
+def test_a_stated_direction_that_the_order_of_rows_shows_too_changes_no_model() -> None:
+    friction = (IN_AND_OUT - play(IN_AND_OUT, 0.1)) / 0.1
+    ordered = Recording.from_arrays(IN_AND_OUT, loop(h=0.0) + 0.3 * friction)
+    without, stated = (identify(each) for each in (ordered, replace(ordered, direction=SIDE)))
+    assert stated.play_radius == without.play_radius == pytest.approx(0.1, rel=0.1)
+    assert (stated.force(IN_AND_OUT, direction=SIDE) == without.force(IN_AND_OUT, direction=SIDE)).all()
+
+
+def test_a_stated_direction_that_contradicts_the_order_of_one_stroke_is_kept() -> None:
+    motion, direction = np.tile(IN_AND_OUT, 2), np.tile(SIDE, 2).astype(np.int8)
+    direction[:400] = -1
+    found = strokes_of([Recording.from_arrays(motion, motion, direction=direction)])
+    assert found.order is None
+    assert found.side is not None
+    assert (found.side == direction).all()
+
+
+def test_rows_behind_a_turn_continue_the_stroke_while_the_friction_reverses() -> None:
+    """The middle between both strokes shows where a friction has reversed; a force that changes at once at
+    the turn is kept."""
+    path = IN_AND_OUT / 4.0
+    reversing, at_once = (np.clip((path - play(path, r)) / r, -1.0, 1.0) for r in (0.005, 1e-6))
+    strokes = path + 0.2 * SIDE
+    found = parallel_behind_turns(path, path + 0.2 * reversing, SIDE)
+    assert np.abs(path + 0.2 * reversing - strokes)[401:].max() > 0.1
+    assert found[401:] == pytest.approx(strokes[401:], abs=1e-9)
+    assert (
+        parallel_behind_turns(path, path + 0.2 * at_once, SIDE)[401:] == (path + 0.2 * at_once)[401:]
+    ).all()
 
 
 def test_rows_with_a_stated_direction_in_another_order_are_not_followed_by_a_play_operator() -> None:
