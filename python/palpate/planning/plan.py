@@ -554,7 +554,7 @@ class Plan:
             return ()
         cure = f". The whole {self.needs}" if self.needs else ""
         share = _percent(self.scale)
-        return (usable(f"{share} of the cogging is compensated, the most that is proved{cure}"),)
+        return (usable(f"only {share} of the cogging is compensated{cure}"),)
 
 
 def describe(scheme: Scheme) -> str:

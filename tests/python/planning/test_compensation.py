@@ -67,7 +67,7 @@ def test_scale_is_that_of_the_closed_form() -> None:
     assert planned.scale == pytest.approx(0.5, abs=2e-3)
     assert planned.scale <= 0.5
     assert planned.verdict.level == "usable"
-    assert "of the cogging is compensated, the most that is proved" in str(planned.verdict)
+    assert "% of the cogging is compensated. The whole needs device damping" in str(planned.verdict)
     assert "needs device damping b >= 0.00084" in planned.needs
     assert planned.certificate is not None
     assert planned.certificate.certified
