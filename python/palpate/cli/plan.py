@@ -234,7 +234,9 @@ def plan(
         chosen = _compensated(model, profile, given)
     else:
         chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
-    ripple = None if fresh is None else _ripple(model, chosen, fresh)
+    ripple = None
+    if fresh is not None and chosen.scale is not None and chosen.verdict.level != "no":
+        ripple = ripple_left(model, chosen.scale, read_recording(fresh))
     seconds = time.perf_counter() - began
     verdict, certificate = model.verdict + chosen.verdict, chosen.certificate
     assert certificate is not None
@@ -256,7 +258,7 @@ def plan(
             print_verdict(verdict)
             rows = _summary(chosen, certificate, profile, written)
             if compensate:
-                rows = _compensation_rows(model, chosen, ripple, fresh) | rows
+                rows = _compensation_rows(model, ripple, fresh) | rows
             print_numbers(rows)
             if verbose:
                 print_details([f"planned in {seconds:.1f} s", *_details(chosen, certificate)])
@@ -274,17 +276,9 @@ def _compensated(model: Model, profile: DeviceProfile, given: dict[str, Any]) ->
     return compensation_plan(model, profile, on_device=given["on_device"])
 
 
-def _ripple(model: Model, plan: Plan, fresh: Path) -> Ripple:
-    """Returns the ripple of a fresh recording, before and after the compensation."""
-    assert plan.scale is not None
-    return ripple_left(model, plan.scale, read_recording(fresh))
-
-
-def _compensation_rows(model: Model, plan: Plan, ripple: Ripple | None, fresh: Path | None) -> dict[str, str]:
-    """Returns scale, remaining ripple and friction for display."""
-    assert plan.scale is not None
-    unit = model.units["force"]
-    rows = {"scale": f"{number(plan.scale)}, proved" if plan.verdict.level != "no" else "none is proved"}
+def _compensation_rows(model: Model, ripple: Ripple | None, fresh: Path | None) -> dict[str, str]:
+    """Returns remaining ripple and friction for display."""
+    unit, rows = model.units["force"], {}
     friction = friction_of(model)
     if ripple is not None and fresh is not None:
         rows[f"ripple of {fresh.name}"] = (
@@ -300,7 +294,8 @@ def _compensation(model: Model, plan: Plan, ripple: Ripple | None) -> dict[str, 
     """Returns scale, remaining ripple and friction for --json."""
     found = None if ripple is None else {"recorded_rms": ripple.recorded, "left_rms": ripple.left}
     friction = friction_of(model) if ripple is None else ripple.friction
-    return {"scale": plan.scale, "friction": friction, "ripple": found}
+    scale = None if plan.verdict.level == "no" else plan.scale
+    return {"scale": scale, "friction": friction, "ripple": found}
 
 
 _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")

@@ -329,7 +329,9 @@ class Plan:
         if self.model.period is None and self.model.dimension == 1:
             rows["below contact"] = f"the force {CONTINUATIONS[self.model.below]}"
         if self.scale is not None:
-            rows["compensation"] = f"{_percent(self.scale)} of the cogging, friction not included"
+            rows["compensation"] = (
+                "no scale is proved" if certificate.refused else f"scale {self.scale:.4g}, proved"
+            )
         rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
@@ -540,7 +542,7 @@ class Plan:
             return ()
         cure = f". The whole {self.needs}" if self.needs else ""
         share = _percent(self.scale)
-        return (usable(f"{share} of the cogging is compensated, the most that is proved{cure}"),)
+        return (usable(f"only {share} of the cogging is compensated{cure}"),)
 
 
 def describe(scheme: Scheme) -> str:

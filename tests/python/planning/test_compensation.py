@@ -67,7 +67,7 @@ def test_scale_is_that_of_the_closed_form() -> None:
     assert planned.scale == pytest.approx(0.5, abs=2e-3)
     assert planned.scale <= 0.5
     assert planned.verdict.level == "usable"
-    assert "of the cogging is compensated, the most that is proved" in str(planned.verdict)
+    assert "% of the cogging is compensated. The whole needs device damping" in str(planned.verdict)
     assert "needs device damping b >= 0.00084" in planned.needs
     assert planned.certificate is not None
     assert planned.certificate.certified
@@ -127,6 +127,7 @@ def test_a_controller_that_holds_lines_cancels_more() -> None:
 def test_without_a_proved_scale_the_verdict_is_no() -> None:
     planned = compensate(motor(), weak(coulomb_friction=0.0, encoder_step=1e-3))
     assert planned.verdict.level == "no"
+    assert planned.summary()["compensation"] == "no scale is proved"
     with pytest.raises(InputError, match="verdict no is not stored"):
         planned.stored()
 
@@ -166,10 +167,10 @@ def test_the_plan_states_scale_ripple_and_friction(
     assert main([*words, "-o", str(output)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     scale = compensate(motor(), "vesc").scale
-    assert f"scale {scale:.4g}, proved" in shown
-    assert re.search(r"ripple of fresh.csv 0.0141 N\*m RMS, 0.008[34]\d* N\*m with the compensation", shown)
+    assert f"compensation scale {scale:.4g}, proved" in shown
+    assert re.search(r"ripple of fresh.csv 0.0142 N\*m RMS, 0.008[34]\d* N\*m with the compensation", shown)
     assert "noise included" in shown
-    assert "friction 0.004 N*m, not compensated" in shown
+    assert re.search(r"friction 0.00(399|4|401) N\*m, not compensated", shown)
     stored = load_model(output)
     assert Plan.of(stored).scale == scale
     assert main([*words, "--json"]) == 0
