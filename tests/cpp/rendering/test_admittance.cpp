@@ -12,6 +12,9 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/solver/newton.hpp"
+#include "palpate/solver/resolvent.hpp"
+#include "solvers/scene.hpp"
 
 namespace palpate::admittance_tests {
 namespace {
@@ -118,6 +121,28 @@ TEST(Admittance, CommandIsAMultipleOfThePositionStepAndAheadByTheFeedForward) {
         EXPECT_NEAR(std::remainder(command.position, 1e-4), 0.0, 1e-12);
         if (k > 500) {  // speed F / B_o
             EXPECT_NEAR(command.position - command.object.environment_position, 0.01 * 4.0 / 20.0, 0.6e-4);
+        }
+    }
+}
+
+// The branch of a table is kept from step to step, and found again after a step that a limit ended elsewhere.
+TEST(Admittance, TableAndSearchMoveTheObjectEquallyAcrossFallsOfTheForce) {
+    const WaveletNetwork network = bench::two_clicks(16);
+    const Inertia light{2e-5, 0.01};  // a load line may have several solutions
+    const double p = light.load_line_slope(period);
+    LoadLineSolver search;
+    search.longest_step = 0.001;
+    search.max_evaluations = 5000;
+    for (const double rate : {0.3, 3.0, 1e9}) {
+        DeviceProfile device = display({.rate_limit = rate});
+        for (const double step : {0.0, 0.05}) {
+            device.force_step = step;
+            Admittance table{Implicit{network, light, none, period, Resolvent{network.curve(), p}}, device};
+            Admittance exact{Implicit{network, light, none, period, search}, device};
+            for (int k = 0; k < 3000; ++k) {
+                const double force = 2.0 - 2.5 * std::cos(0.004 * k) + 0.5 * std::sin(0.37 * k);
+                EXPECT_NEAR(table.step(force).position, exact.step(force).position, 1e-8) << k;
+            }
         }
     }
 }
