@@ -193,8 +193,8 @@ def check_device(
         if device != "simulated":
             raise InputError(
                 f"profile is that of the admittance display {profile.id}: its servo is measured on "
-                f"the device 'simulated', not on '{device}'; of a real display, give commands and positions to "
-                "palpate.devices.identify_servo"
+                f"the device 'simulated', not on '{device}'; of a real display, give commands and positions "
+                "to palpate.devices.identify_servo"
             )
         return judge_servo(profile, measure_servo(profile, duration_s))
     common: dict[str, Any] = {

@@ -76,9 +76,10 @@ def chirp(device: DeviceProfile, amplitude: float, duration_s: float) -> Float1D
     speed = 2.0 * np.pi * _LOWEST_HZ * np.exp(rise * time)
     phase = 2.0 * np.pi * _LOWEST_HZ * np.expm1(rise * time) / rise
     display = device.admittance
+    size = np.full(len(time), amplitude)
     if display is not None and display.rate_limit is not None:
-        return np.minimum(amplitude, _RATE_SHARE * display.rate_limit / speed) * np.sin(phase)
-    return amplitude * np.sin(phase)
+        size = np.minimum(amplitude, _RATE_SHARE * display.rate_limit / speed)
+    return np.asarray(size * np.sin(phase), dtype=np.float64)
 
 
 def measure_servo(device: DeviceProfile, duration_s: float) -> ServoEstimate:
@@ -173,12 +174,14 @@ def _fit(
     first = min(starts, key=lambda each: float(np.sum((motion(each) - position) ** 2)))
     lower = np.array([0.0, np.log(0.1), np.log(0.05)][: order + 1])
     upper = np.array([16.0, np.log(0.5 / period_s), np.log(20.0)][: order + 1])
-    found = scipy.optimize.least_squares(
-        lambda each: (motion(each) - position) / scale, first, bounds=(lower, upper), xtol=1e-14, ftol=1e-14
-    )
+
+    def difference(parameters: Float1D) -> Float1D:
+        return np.asarray((motion(parameters) - position) / scale, dtype=np.float64)
+
+    found = scipy.optimize.least_squares(difference, first, bounds=(lower, upper), xtol=1e-14, ftol=1e-14)
     residual = float(np.sqrt(np.mean(found.fun**2))) * scale
     noise = max(residual, step / np.sqrt(12.0), 1e-9 * scale)
-    jacobian = found.jac * scale
+    jacobian = np.asarray(found.jac, dtype=np.float64) * scale
     errors = SIGMAS * noise * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
     late, bandwidth = float(found.x[0]) * period_s, float(np.exp(found.x[1]))
     damping = None if order == 1 else float(np.exp(found.x[2]))

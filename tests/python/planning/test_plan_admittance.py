@@ -183,7 +183,7 @@ def test_the_curve_of_a_planned_pedal_states_its_error_and_where_it_falls(
     assert found["largest_error"] == pytest.approx(error, rel=1e-3)
     assert not found["falls"]
     palpate.plan(clutch(), pedal()).stored().save(tmp_path / "clutch.json")
-    assert main(["export", str(tmp_path / "clutch.json"), "--knots", "11", "-o", str(curve)]) == 0
+    assert main(["export", str(tmp_path / "clutch.json"), "--knots", "11", "-o", f"{curve}.2"]) == 0
     assert "looks up its position for a force jumps there" in capsys.readouterr().out
 
 
@@ -252,8 +252,9 @@ def test_a_rendered_pedal_is_identified_from_its_recording(planned: Plan, tmp_pa
     model = palpate.identify(recording)
     x = np.linspace(recording.position.min(), recording.position.max(), 50)[5:-5]
     force = planned.model.force(x)
-    # In slow motion the foot feels the object, and the damping of the object in addition
-    assert np.abs(model.force(x, velocity=0.0 * x) - force).max() < 0.05 * np.ptp(force)
+    # The damping of the object, and of its lag, appears as a loop
+    sides = [np.asarray(model.force(x, direction=side)) for side in (1.0, -1.0)]
+    assert np.abs(np.mean(sides, axis=0) - force).max() < 0.05 * np.ptp(force)
 
 
 def drive_display(**changes: Any) -> DeviceProfile:
