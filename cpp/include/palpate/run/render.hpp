@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -361,6 +362,11 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
             "the device renders the model; the host watches and records the force of its motor");
     } else if (reason.empty()) {
         detail::apply_certificate(*model.certificate, job.guards, loop);
+        if (device.simulated && device.profile.admittance) {
+            // The certificate needs a constant period. The simulated time has it, the time of the host never has
+            loop.lowest_rate_share = options.loop.lowest_rate_share;
+            loop.longest_period_s = std::numeric_limits<double>::infinity();
+        }
     } else if (model.certificate && device.simulated) {
         job.notes.push_back("uncertified: " + reason);
     }
