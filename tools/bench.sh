@@ -21,7 +21,7 @@ processor=$(awk -F': ' '/^model name/ { print $2; exit }' /proc/cpuinfo 2>/dev/n
 compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
 flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
 
-for source in bench/solvers/bench_*.cpp; do
+for source in bench/solvers/bench_*.cpp bench/admittance/bench_admittance.cpp; do
     name=$(basename "$source" .cpp)
     "build/release/bench/$name" \
         --benchmark_min_time="$seconds" --benchmark_repetitions="$repetitions" \
@@ -63,6 +63,7 @@ limits/prediction.py --to $to
 rivals/rivals.py --to $to
 plans/on_device_stiffness.py --to $to
 plans/held_lines.py --to $to $([ "$at_once" -gt 1 ] && echo --devices 1)
+admittance/admittance.py --to $to
 portable/cost.py --to $to --json build/bench/portable_cost.json
 plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')
 END

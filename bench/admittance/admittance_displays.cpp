@@ -7,18 +7,27 @@
 //
 //     clutch:  oscillation of a clutch pedal with a force peak, and of the inverse curve
 //
+//     motion:  motion of the same pedals over time, as CSV
+//
 //     stops:   energy of a free mass between two stops
 //
-//     map:     largest stable stiffness of explicit and implicit over mass and damping
+//     map:     limits of explicit and implicit over stiffness, mass and damping, as JSON: map [POINTS]
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
-#include <cstring>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "admittance/displays.hpp"
+#include "limits/failure_map.hpp"
 
 namespace {
 
@@ -29,6 +38,8 @@ using palpate::ForceBounds;
 using palpate::Grip;
 using palpate::Inertia;
 using palpate::StructureKind;
+using palpate::bench::FailureLine;
+using palpate::bench::FailureMap;
 using palpate::bench::LinearSpring;
 
 constexpr palpate::VirtualCoupling none{0.0, 0.0};
@@ -84,7 +95,10 @@ void print_line() {
     const Case cases[]{
         {"2 kg, 1 ms, first order 20 Hz", 2.0, display(1e-3, 1, 20.0, {}, 5e3, 50.0), {0.0, 5e3}},
         {"2 kg, 1 ms, second order 20 Hz", 2.0, display(1e-3, 1, 20.0, 0.8, 5e3, 50.0), {0.0, 5e3}},
-        {"same, falling slopes", 2.0, display(1e-3, 1, 20.0, 0.8, 5e3, 50.0), {-3e3, 9e3}},
+        {"2 kg, 1 ms, second order 20 Hz, falling slopes",
+         2.0,
+         display(1e-3, 1, 20.0, 0.8, 5e3, 50.0),
+         {-3e3, 9e3}},
         {"5 kg, 4 ms, second order 10 Hz", 5.0, display(4e-3, 1, 10.0, 0.8, 5e3, 50.0), {0.0, 5e3}},
         {"pedal 2 kg, 0.25 ms, second order 60 Hz",
          2.0,
@@ -161,26 +175,54 @@ int print_linear() {
 }
 
 void print_clutch() {
-    const ForceBounds bounds = palpate::bench::Clutch::bounds();
-    const Inertia object = palpate::admittance_object(StructureKind::Implicit, bounds, {1.0, 0.0},
-                                                      palpate::bench::clutch_pedal(), 1.0);
-    std::printf(
-        "clutch: slopes %.4g to %.4g N/mm, 4 kHz, servo 60 Hz, foot 20 N/mm, mass 1 kg, certified B_o "
-        "%.4g N*s/m\n\n| rendering | damping of the foot [N*s/m] | oscillation at the end [um] "
-        "|\n|---|---|---|\n",
-        1e-3 * bounds.slope.lower, 1e-3 * bounds.slope.upper, object.damping);
-    for (const double damping : {0.0, 50.0}) {
-        for (const double share : {1.0, 0.9, 0.8, 0.5, 0.3}) {
-            std::printf("| virtual object, %g of the certified B_o | %g | %.4g |\n", share, damping,
-                        1e6 * palpate::bench::clutch_oscillation(share, 1.0, damping));
-        }
-        for (const double filter : {0.0, 1e-2}) {
-            for (const double rest : {17e-3, 19e-3, 22e-3}) {
-                std::printf("| inverse of the curve, rest at %g mm, filter %g ms | %g | %.4g |\n", 1e3 * rest,
-                            1e3 * filter, damping,
-                            1e6 * palpate::bench::inverse_oscillation(rest, filter, damping));
+    const Inertia object =
+        palpate::admittance_object(StructureKind::Implicit, palpate::bench::Clutch::bounds(), {1.0, 0.0},
+                                   palpate::bench::clutch_pedal(), 1.0);
+    std::printf("certified object damping: %.4g N*s/m\n\n", object.damping);
+    std::printf("| rendering | foot without damping [mm] | foot with 50 N*s/m [mm] |\n|---|---:|---:|\n");
+    for (const double share : {1.0, 0.9, 0.8, 0.5, 0.3}) {
+        std::printf("| virtual object, %g of the certified damping | %.2g | %.2g |\n", share,
+                    1e3 * palpate::bench::clutch_oscillation(share, 1.0, 0.0),
+                    1e3 * palpate::bench::clutch_oscillation(share, 1.0, 50.0));
+    }
+    for (const double filter : {0.0, 1e-2}) {
+        std::printf("| position over force, filter of %g ms |", 1e3 * filter);
+        for (const double damping : {0.0, 50.0}) {
+            std::array<double, 3> found{17e-3, 19e-3, 22e-3};
+            for (double& each : found) {
+                each = 1e3 * palpate::bench::inverse_oscillation(each, filter, damping);
             }
+            const auto [low, high] = std::minmax_element(found.begin(), found.end());
+            std::printf(" %.2g to %.2g |", *low, *high);
         }
+        std::printf("\n");
+    }
+}
+
+/// Prints the motion of the clutch pedal at rest on the drop of its force, in mm, with a foot without damping.
+void print_motion() {
+    constexpr double rest = 19e-3;
+    constexpr double start = 1e-4;  // distance from the rest position [m]
+    constexpr int samples = 800;
+    const DeviceProfile device = palpate::bench::clutch_pedal();
+    const Grip hand = palpate::bench::clutch_foot(rest, 0.0);
+    std::vector<std::vector<double>> columns;
+    for (const double share : {1.0, 0.9}) {
+        Admittance source = palpate::bench::clutch_object(share, 1.0);
+        source.reset(rest + start);
+        columns.push_back(palpate::bench::handle_motion(
+            device, hand, rest + start, samples, [&](double force) { return source.step(force).position; }));
+    }
+    palpate::bench::InverseClutch inverse{hand.push};
+    columns.push_back(palpate::bench::handle_motion(device, hand, rest + start, samples,
+                                                    [&](double force) { return inverse.command(force); }));
+    std::printf("time_s,certified_mm,nine_tenths_mm,inverse_mm\n");
+    for (std::size_t k = 0; k < columns.front().size(); ++k) {
+        std::printf("%.6g", device.period_s * static_cast<double>(k + 1));
+        for (const std::vector<double>& column : columns) {
+            std::printf(",%.5g", 1e3 * column[k]);
+        }
+        std::printf("\n");
     }
 }
 
@@ -203,25 +245,81 @@ void print_stops() {
     }
 }
 
-void print_map() {
-    const double T = 1e-3;
-    std::printf("mass_kg,object_damping,structure,formula,simulated\n");
-    for (const double mass : {0.1, 0.3, 1.0, 3.0}) {
-        for (const double damping : {0.0, 3.0, 10.0, 30.0}) {
-            for (const StructureKind structure : {StructureKind::Explicit, StructureKind::Implicit}) {
-                const bool is_explicit = structure == StructureKind::Explicit;
-                const DeviceProfile device = display(T, 0, {}, {}, 0.0, 0.0);
-                const double formula = 4.0 * mass / (T * T) + (is_explicit ? -2.0 : 2.0) * damping / T;
-                const double simulated =
-                    palpate::bench::limit_between(0.5 * formula, 1.5 * formula, [&](double stiffness) {
-                        return palpate::bench::grows(spring(structure, 0.0, {mass, damping}, device), device,
-                                                     {.stiffness = stiffness}, 20'000);
-                    });
-                std::printf("%g,%g,%s,%.6g,%.6g\n", mass, damping, is_explicit ? "explicit" : "implicit",
-                            formula, simulated);
-            }
+/// Kinds of the maps, with their words.
+constexpr std::pair<StructureKind, const char*> steps[]{{StructureKind::Implicit, "implicit"},
+                                                        {StructureKind::Explicit, "explicit"}};
+constexpr double map_masses[]{0.3, 1.0};
+
+/// Stiffest spring hand of a display without lag, whose object is a spring: 4 m / T^2 + 2 B_o / T + f' with the implicit
+/// step, 4 m / T^2 - 2 B_o / T - f' with the explicit one.
+FailureMap stiffness_map(const char* name, const char* along, const std::vector<double>& at,
+                         bool over_damping) {
+    constexpr double T = 1e-3;
+    constexpr double other = 10.0;  // damping [N*s/m] or slope [N/m] that the axis does not show
+    FailureMap map{name, along, "stiffness of the hand [N/m]", {}};
+    const DeviceProfile device = display(T, 0, {}, {}, 0.0, 0.0);
+    for (const auto& [structure, word] : steps) {
+        for (const double mass : map_masses) {
+            const double sign = structure == StructureKind::Implicit ? 1.0 : -1.0;
+            const auto damping = [&](double value) { return over_damping ? value : other; };
+            const auto slope = [&](double value) { return over_damping ? other : value; };
+            map.lines.push_back(palpate::bench::failure_line(
+                std::string(word) + ", " + palpate::readable(mass) + " kg", at,
+                [&](double value) {
+                    return 4.0 * mass / (T * T) + sign * (2.0 * damping(value) / T + slope(value));
+                },
+                [&](double value, double stiffness) {
+                    return palpate::bench::grows(
+                        spring(structure, slope(value), {mass, damping(value)}, device), device,
+                        {.stiffness = stiffness}, 20'000);
+                },
+                1.5));
         }
     }
+    return map;
+}
+
+/// Least object damping of a pedal with a servo, over the mass: simulated, exact for a spring, and certified.
+FailureMap damping_map(int points) {
+    constexpr double stiffness = 2e4;
+    constexpr double slope = 5e3;
+    FailureMap map{"servo", "mass m [kg]", "least damping B_o [N*s/m]", {}};
+    const DeviceProfile device = display(2.5e-4, 1, 60.0, 0.8, stiffness, 0.0);
+    ForceBounds bounds;
+    bounds.slope = {0.0, slope};
+    bounds.steepest = bounds.sliding = slope;
+    const std::vector<double> masses = palpate::bench::logarithmic(0.05, 5.0, points);
+    for (const auto& [structure, word] : steps) {
+        FailureLine line{word, masses, {}, {}};
+        FailureLine certified{std::string(word) + ", certified", masses, {}, {}};
+        for (const double mass : masses) {
+            const double exact =
+                palpate::bench::exact_damping_limit(structure, mass, slope, stiffness, device);
+            line.theory.push_back(exact);
+            line.measured.push_back(
+                palpate::bench::limit_between(2.0 * exact, 0.5 * exact, [&](double damping) {
+                    return palpate::bench::grows(spring(structure, slope, {mass, damping}, device), device,
+                                                 {.stiffness = stiffness}, 40'000);
+                }));
+            const double needed =
+                palpate::admittance_object(structure, bounds, {mass, 0.0}, device, mass).damping;
+            certified.measured.push_back(needed);
+            certified.theory.push_back(exact);
+        }
+        map.lines.push_back(line);
+        map.lines.push_back(certified);
+    }
+    return map;
+}
+
+void print_map(int points) {
+    const auto json = nlohmann::ordered_json::array(
+        {as_json(stiffness_map("damping", "object damping B_o [N*s/m]",
+                               palpate::bench::logarithmic(3.0, 500.0, points), true)),
+         as_json(stiffness_map("slope", "slope of the object f' [N/m]",
+                               palpate::bench::logarithmic(1e4, 1e6, points), false)),
+         as_json(damping_map(points))});
+    std::puts(json.dump(1).c_str());
 }
 
 }  // namespace
@@ -236,10 +334,12 @@ int main(int argc, char** argv) {
         print_clutch();
     } else if (which == "stops") {
         print_stops();
+    } else if (which == "motion") {
+        print_motion();
     } else if (which == "map") {
-        print_map();
+        print_map(argc > 2 ? std::max(2, std::atoi(argv[2])) : 9);
     } else {
-        std::fprintf(stderr, "usage: admittance_displays line|linear|clutch|stops|map\n");
+        std::fprintf(stderr, "usage: admittance_displays line|linear|clutch|motion|stops|map [POINTS]\n");
         return 2;
     }
     return 0;

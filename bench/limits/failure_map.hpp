@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 namespace palpate::bench {
 
 /// One line of a failure map: limit (for example of a stiffness) as a function of one quantity (for example the
@@ -76,6 +78,17 @@ template <class Theory, class Fails>
                                                  [&](double limit) { return fails(value, limit); }));
     }
     return line;
+}
+
+/// Returns a failure map as JSON; a value NaN is printed as null.
+[[nodiscard]] inline nlohmann::ordered_json as_json(const FailureMap& map) {
+    nlohmann::ordered_json lines = nlohmann::ordered_json::array();
+    for (const FailureLine& line : map.lines) {
+        lines.push_back(
+            {{"name", line.name}, {"at", line.at}, {"measured", line.measured}, {"theory", line.theory}});
+    }
+    return {{"name", map.name},         {"along", map.along},   {"limit", map.limit},
+            {"searched", map.searched}, {"linear", map.linear}, {"lines", lines}};
 }
 
 }  // namespace palpate::bench

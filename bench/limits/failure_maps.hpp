@@ -38,17 +38,6 @@ inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
     {"guard", guard_map},
 });
 
-/// Returns a failure map as JSON; a value NaN is printed as null.
-[[nodiscard]] inline nlohmann::ordered_json as_json(const FailureMap& map) {
-    nlohmann::ordered_json lines = nlohmann::ordered_json::array();
-    for (const FailureLine& line : map.lines) {
-        lines.push_back(
-            {{"name", line.name}, {"at", line.at}, {"measured", line.measured}, {"theory", line.theory}});
-    }
-    return {{"name", map.name},         {"along", map.along},   {"limit", map.limit},
-            {"searched", map.searched}, {"linear", map.linear}, {"lines", lines}};
-}
-
 [[nodiscard]] inline nlohmann::ordered_json as_json(const GuardEffect& effect) {
     return {{"guard", effect.guard},
             {"cost", effect.cost},

@@ -15,6 +15,7 @@
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/press.hpp"
+#include "palpate/simulation/simulated_display.hpp"
 #include "palpate/simulation/test_rig.hpp"
 #include "palpate/stability/account_certificate.hpp"
 #include "settings.hpp"
@@ -186,6 +187,22 @@ void bind_simulation(py::module_& module) {
         "errors [N or N*m]: `end`, at the end of each tick; `instant`, at the time of the sample;\n"
         "`mean`, mean error over a tick; `band`, mean error below 50 Hz. `work` is the work of the error\n"
         "[J]. The arrays (n,) are those of simulate(); play_radius 0 means the play radius of the model.");
+    module.def(
+        "display_motion",
+        [](const DeviceProfile& device, const Array& command, double start) {
+            require_vector(command, "command");
+            SimulatedDisplay display{device, start};
+            std::vector<double> position;
+            position.reserve(view(command).size());
+            for (const double each : view(command)) {
+                display.move(each);
+                position.push_back(display.handle().position);
+            }
+            return moved(std::move(position));
+        },
+        "device"_a, "command"_a, "start"_a = 0.0,
+        "Returns the positions (n,) of the handle of an admittance display, each at the end of the period\n"
+        "after a position command (n,). The handle starts at rest at start.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {

@@ -28,7 +28,7 @@ BLOCKS = {name: list(page_code.blocks(text)) for name, text in PAGES.items()}
 NOT_RUN = {
     "docs/how-to/cluster.md": 1,  # a cluster
     "docs/how-to/firmware.md": 2,  # a device
-    "docs/how-to/pedal.md": 1,  # a part of a program
+    "docs/how-to/pedal.md": 2,  # real time, a part of a program
     "docs/how-to/motor.md": 2,  # CAN hardware
     "docs/how-to/real-time.md": 3,  # system administration, a quiet computer
     "docs/how-to/simulator.md": 4,  # MuJoCo, FMPy

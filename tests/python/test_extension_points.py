@@ -88,7 +88,9 @@ def test_no_line_of_the_pages_lists_all_structures() -> None:
 def test_every_field_of_a_profile_is_in_schema_and_stub_with_its_unit() -> None:
     stub = (PACKAGE / "_core" / "device.pyi").read_text(encoding="utf-8")
     assert list(SCHEMA["Device"]["properties"]) == [name for name in FIELDS if name != PROFILE_ONLY]
-    display = AdmittanceDisplay(servo_bandwidth_hz=60.0, servo_damping=0.8, rate_limit=0.5)
+    display = AdmittanceDisplay(
+        servo_bandwidth_hz=60.0, servo_damping=0.8, rate_limit=0.5, drive_stiffness=300.0, drive_damping=0.9
+    )
     assert list(SCHEMA["AdmittanceDisplay"]["properties"]) == list(display.to_dict())
     assert SCHEMA["AdmittanceDisplay"]["required"] == list(AdmittanceDisplay().to_dict())
     for name in FIELDS:

@@ -24,6 +24,7 @@ enum class Status : std::uint8_t {
     EnergyLimited,
     LimitCycleScaled,
     Stale,
+    Saturated,
 };
 
 /// The word of a status, such as "Ok", and its meaning as a sentence.
@@ -33,7 +34,7 @@ struct StatusText {
 };
 
 /// Word and meaning of every status, in the order of the enumeration.
-inline constexpr std::array<StatusText, 14> status_texts{{
+inline constexpr std::array<StatusText, 15> status_texts{{
     {"Ok", "the step was computed to its tolerance, without an error or limit"},
     {"MaxIterations",
      "the solver of the load line used all its evaluations; the position is its best approximation"},
@@ -56,6 +57,8 @@ inline constexpr std::array<StatusText, 14> status_texts{{
      "the device applied a force computed from an older sample than the certificate allows; the force sent "
      "is "
      "zero"},
+    {"Saturated",
+     "the force sensor of an admittance display was at the end of its range; the position is held"},
 }};
 
 /// Returns word and meaning of a status.
@@ -63,7 +66,8 @@ inline constexpr std::array<StatusText, 14> status_texts{{
     return status_texts[static_cast<std::size_t>(status)];
 }
 
-/// Returns true if a tick with this status sends the computed force. With another status zero force is sent.
+/// Returns true if a tick with this status sends the computed force. With another status zero force is sent, and an admittance display
+/// holds its position.
 [[nodiscard]] constexpr bool sends_force(Status status) noexcept {
     return status == Status::Ok || status == Status::MaxIterations || status == Status::NotUnique ||
            status == Status::Limited || status == Status::Ramp || status == Status::EnergyLimited ||
@@ -73,7 +77,7 @@ inline constexpr std::array<StatusText, 14> status_texts{{
 /// Returns true if the run must end after this status, because the device or its readings are no longer reliable.
 [[nodiscard]] constexpr bool is_final(Status status) noexcept {
     return status == Status::Fault || status == Status::Jump || status == Status::Frozen ||
-           status == Status::Stale;
+           status == Status::Stale || status == Status::Saturated;
 }
 
 }  // namespace palpate

@@ -57,7 +57,7 @@ class AdmittanceDisplay:
     def __hash__(self) -> int:
         ...
     @typing.overload
-    def __init__(self, *, hand_stiffness: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_damping: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, handle_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, servo_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex | None = None, servo_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, feed_forward_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, hand_stiffness: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_damping: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, handle_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, servo_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex | None = None, servo_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, feed_forward_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, drive_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, drive_damping: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     @typing.overload
     def __init__(self, fields: dict) -> None:
@@ -69,6 +69,16 @@ class AdmittanceDisplay:
     def to_dict(self) -> dict:
         """
         Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def drive_damping(self) -> float | None:
+        """
+        Damping of the position control of a motor drive [N*m*s/rad]; a moteus uses its own servo.pid_position.kd. Absent: none.
+        """
+    @property
+    def drive_stiffness(self) -> float | None:
+        """
+        Stiffness of the position control of a motor drive, which each command states [N*m/rad]; absent: the servo has its own.
         """
     @property
     def feed_forward_s(self) -> float:

@@ -10,7 +10,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['AccountUse', 'Hand', 'RestingOscillation', 'TestRig', 'account_use', 'force_driven', 'force_error', 'motion_driven', 'resting_oscillation', 'rig_for', 'simulate', 'smallest_domain_share', 'tolerated_change']
+__all__: list[str] = ['AccountUse', 'Hand', 'RestingOscillation', 'TestRig', 'account_use', 'display_motion', 'force_driven', 'force_error', 'motion_driven', 'resting_oscillation', 'rig_for', 'simulate', 'smallest_domain_share', 'tolerated_change']
 class Hand:
     """
     Simulated hand: a spring to a target that moves between lower and upper, and
@@ -172,6 +172,11 @@ def account_use(model: palpate._core.model.ForceModel, scheme: palpate._core.ren
     presses at 10, 30, 100 and 300 mm/s, or turns a knob of 40 mm diameter at the same speed; speeds
     above the largest speed are left out. It rests with a tremor of 10 Hz where the force is largest
     and where its slope is steepest.
+    """
+def display_motion(device: palpate._core.device.DeviceProfile, command: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Returns the positions (n,) of the handle of an admittance display, each at the end of the period
+    after a position command (n,). The handle starts at rest at start.
     """
 def force_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """

@@ -76,7 +76,8 @@ def check_device(
 
     The device stays disabled while its rate, period, lost samples and encoder are measured. Move the handle
     against an object to show the signs of its velocity and transducer. A reversed motor cannot be detected
-    while the drive is disabled. Do not render before this check. Exit code 1: not suitable.
+    while the drive is disabled. Do not render before this check. With the profile of an admittance display,
+    a chirp of commands measures delay and lag of its servo. Exit code 1: not suitable.
     """
     if write_profile is not None:
         if not push:

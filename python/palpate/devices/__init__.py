@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """USB devices: search, setup, check, and recording of an object."""
 
-from .check import Check, check_device, judge, with_pushes
+from .check import Check, check_device, judge, judge_servo, with_pushes
 from .measuring import measure, record
 from .observations import Observation
 from .pushes import Push, push_response
+from .servo import ServoEstimate, chirp, identify_servo, measure_servo
 from .usb import DeviceError, Found, UsbSetup, find_devices, install_rule, open_usb
 
 __all__ = [
@@ -13,12 +14,17 @@ __all__ = [
     "Found",
     "Observation",
     "Push",
+    "ServoEstimate",
     "UsbSetup",
     "check_device",
+    "chirp",
     "find_devices",
+    "identify_servo",
     "install_rule",
     "judge",
+    "judge_servo",
     "measure",
+    "measure_servo",
     "open_usb",
     "push_response",
     "record",

@@ -18,6 +18,7 @@ from ..verdict import Verdict
 from .measuring import Progress, measure
 from .observations import Observation, compare, interruption, observe_at_rest
 from .pushes import Mechanics, Push, push_response
+from .servo import ServoEstimate, measure_servo
 
 NO_FORCE_SHARE = 0.7
 """Share of the duration of a check with pushes in which no force is sent [-]"""
@@ -44,6 +45,9 @@ _LEAST_SIGN_ERRORS = 3.0
 """Mean displacement by pushes that is needed to judge the sign of the force [standard errors of the mean]"""
 _FORCE_SIGN = "sign of the force"
 """Name of the observation on the sign of the device's force"""
+_SERVO_TOLERANCE = 0.05
+"""Accepted difference of a measured position servo from its profile, in addition to the error of the
+measurement [share of the value, or of the period for the delay]"""
 _SIMULATED_FRICTION_SHARE = 0.002
 """Coulomb friction of the simulated device [share of the device's largest force]"""
 
@@ -164,7 +168,8 @@ def check_device(
     push : bool
         True if the device may push.
     profile : DeviceProfile, optional
-        The expected device.
+        The expected device. With the profile of an admittance display, a chirp of commands measures delay and
+        lag of the position servo in place of the rest.
     model : Model, optional
         Model with a certificate, which is checked for this device.
     coulomb_friction : float, optional
@@ -184,6 +189,14 @@ def check_device(
     if coulomb_friction is not None and not 0.0 <= coulomb_friction < math.inf:
         raise InputError(f"coulomb_friction is {coulomb_friction:g}, must be a finite number >= 0")
     expected = _expected(profile, model)
+    if profile is not None and profile.admittance is not None:
+        if device != "simulated":
+            raise InputError(
+                f"profile is that of the admittance display {profile.id}: its servo is measured on "
+                f"the device 'simulated', not on '{device}'; of a real display, give commands and positions "
+                "to palpate.devices.identify_servo"
+            )
+        return judge_servo(profile, measure_servo(profile, duration_s))
     common: dict[str, Any] = {
         "object": object,
         "transducer": transducer,
@@ -276,6 +289,60 @@ def judge(summary: Mapping[str, Any]) -> Check:
             )
         )
     return Check(summary["device"], tuple(observations), numbers, base)
+
+
+def judge_servo(profile: DeviceProfile, servo: ServoEstimate) -> Check:
+    """Compares the measured position servo of an admittance display with its profile.
+
+    A certificate needs at least the true delay and lag, so a profile is wrong if it states less than the
+    measured values minus their errors. A difference above the errors and 5 % is wrong in both directions.
+    """
+    display = profile.admittance
+    assert display is not None
+    error = servo.delay_error_s + _SERVO_TOLERANCE * profile.period_s
+    delay = Observation(
+        "delay",
+        f"{1e3 * servo.delay_s:.4g} ± {1e3 * servo.delay_error_s:.1g} ms from a command to the motion, "
+        f"{1e3 * profile.delay_s:.4g} ms in the profile",
+        abs(servo.delay_s - profile.delay_s) <= error,
+        "set delay_s of the profile to the measured value, and plan again",
+    )
+    words = "the servo moves at once"
+    if servo.bandwidth_hz is not None:
+        words = f"bandwidth {servo.bandwidth_hz:.4g} ± {servo.bandwidth_error_hz:.1g} Hz"
+        if servo.damping is not None:
+            words += f", damping ratio {servo.damping:.3g} ± {servo.damping_error:.1g}"
+    pairs = (
+        (servo.bandwidth_hz, display.servo_bandwidth_hz, servo.bandwidth_error_hz),
+        (servo.damping, display.servo_damping, servo.damping_error),
+    )
+    agrees = all(
+        (measured is None) == (stated is None)
+        and (
+            measured is None or stated is None or abs(measured - stated) <= error + _SERVO_TOLERANCE * stated
+        )
+        for measured, stated, error in pairs
+    )
+    lag = Observation(
+        "servo",
+        f"{words}, lag {1e3 * servo.lag_s:.3g} ms",
+        agrees,
+        "set servo_bandwidth_hz and servo_damping of the profile to the measured values, and plan again",
+    )
+    numbers: dict[str, float | None] = {
+        "delay_s": servo.delay_s,
+        "delay_error_s": servo.delay_error_s,
+        "servo_bandwidth_hz": servo.bandwidth_hz,
+        "servo_bandwidth_error_hz": servo.bandwidth_error_hz,
+        "servo_damping": servo.damping,
+        "servo_damping_error": servo.damping_error,
+        "lag_s": servo.lag_s,
+        "residual": servo.residual,
+        "inertia": None,
+        "viscous_damping": None,
+        "coulomb_friction_at_least": None,
+    }
+    return Check(f"{profile.id} (simulated: no device moves)", (delay, lag), numbers, profile)
 
 
 def with_pushes(check: Check, push: Push) -> Check:

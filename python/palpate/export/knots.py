@@ -39,6 +39,7 @@ def write(request: Request) -> Written:
     rows = zip(np.linspace(0.0, 100.0, count), x, knots, strict=True)
     text = f"travel_percent,position_{position},force_{force}\n"
     request.write_text(text + "".join(f"{p:.6g},{at:.9g},{y:.9g}\n" for p, at, y in rows))
+    falls = np.flatnonzero(np.diff(knots) < 0.0)
     loop = 0.0
     if model.hysteretic:
         loop = float(np.abs(exact - np.asarray(model.force(fine, direction=-1.0))).max())
@@ -48,7 +49,21 @@ def write(request: Request) -> Written:
             "curve": f"{request.output}: {count} knots, straight lines between them",
             "largest error": f"{largest:.3g} {force} at {fine[worst]:.4g} {position}, "
             f"{share:.2g} % of the range",
+            **(
+                {
+                    "falls": f"between {x[falls[0]]:.4g} and {x[falls[-1] + 1]:.4g} {position}: a pedal that "
+                    "looks up its position for a force jumps there; use --c"
+                }
+                if len(falls)
+                else {}
+            ),
             **({"release": f"up to {loop:.3g} {force} below the curve"} if model.hysteretic else {}),
         },
-        {"knots": count, "largest_error": largest, "at": float(fine[worst]), "largest_loop": loop},
+        {
+            "knots": count,
+            "largest_error": largest,
+            "at": float(fine[worst]),
+            "largest_loop": loop,
+            "falls": bool(len(falls)),
+        },
     )

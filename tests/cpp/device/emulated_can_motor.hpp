@@ -119,7 +119,8 @@ class EmulatedMitDrive : public EmulatedCanMotor<EmulatedMitDrive> {
     mit::Preset preset;
     std::map<int, std::uint32_t> registers;
     bool silent_registers = false, watchdog_refused = false;
-    int end_code = -1;  ///< code of the position that it reports; -1: the right one
+    double damping = 0.0;  ///< kd of the last command
+    int end_code = -1;     ///< code of the position that it reports; -1: the right one
 
     void obey(const canfd_frame& frame) noexcept {
         const std::uint8_t* d = frame.data;
@@ -148,6 +149,7 @@ class EmulatedMitDrive : public EmulatedCanMotor<EmulatedMitDrive> {
             const mit::Ranges& r = preset.ranges;
             target = field(d[0] * 256 + d[1], -r.position, r.position, 16);
             stiffness = field((d[3] % 16) * 256 + d[4], 0.0, r.stiffness, 12);
+            damping = field(d[5] * 16 + d[6] / 16, 0.0, r.damping, 12);
             feed_forward = field((d[6] % 16) * 256 + d[7], -r.torque, r.torque, 12);
         }
         write_answer();

@@ -67,6 +67,32 @@ TEST(MoteusWire, ALineIsExactAtItsPositionToSinglePrecision) {
     }
 }
 
+TEST(MitWire, APositionCommandHasTheDampingOfTheDriveAndZeroForceHasNone) {
+    EmulatedMitDrive::Motor motor{{.damping = 0.8}, EmulatedMitDrive{}};
+    ASSERT_TRUE(motor.open());
+    const double half = 0.501 * mit::step_of(0.0, mit::presets.front().ranges.damping, mit::field_bits);
+    EXPECT_EQ(motor.exchange({0.0, 0.31, 300.0}).status, Status::Ok);
+    EXPECT_NEAR(motor.bus().damping, 0.8, half);
+    EXPECT_NEAR(motor.bus().target, 0.31, 2e-4);
+    EXPECT_NEAR(motor.bus().stiffness, 300.0, 0.07);
+    (void)motor.exchange({});
+    EXPECT_EQ(motor.bus().damping, 0.0);
+    auto line = EmulatedMitDrive{}.motor();
+    ASSERT_TRUE(line.open());
+    (void)line.exchange({0.0, 0.31, 300.0});
+    EXPECT_EQ(line.bus().damping, 0.0);
+}
+
+TEST(MoteusWire, APositionCommandUsesTheDampingOfTheControllerAndZeroForceDoesNot) {
+    EmulatedMoteus::Motor motor{{.kp = EmulatedMoteus::kp, .torque_limit = 5.0, .damping = 1.0},
+                                EmulatedMoteus{}};
+    ASSERT_TRUE(motor.open());
+    (void)motor.exchange({0.0, 0.31, 3.0});
+    EXPECT_EQ(motor.bus().values[0x24], 1.0);
+    (void)motor.exchange({});
+    EXPECT_EQ(motor.bus().values[0x24], 0.0);
+}
+
 TEST(MoteusWire, AnAnswerOfAnyBytesIsReadWithoutAnError) {
     test::Random random{3};
     std::vector<std::uint8_t> bytes(64);

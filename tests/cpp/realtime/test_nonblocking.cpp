@@ -29,6 +29,7 @@
 #include <string>
 #include <thread>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -36,8 +37,10 @@
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/admittance_controller.hpp"
 #include "palpate/run/session.hpp"
 #include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/simulated_display.hpp"
 #include "support.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -116,10 +119,11 @@ std::atomic<void*> escaped{nullptr};
 
 /// A simulated device that does one action that is forbidden in a real-time loop, in the fifth exchange of position and
 /// force.
-template <class ForbiddenAction>
+template <class ForbiddenAction, class Simulated = SimulatedDevice>
 class FaultyHandle {
   public:
-    explicit FaultyHandle(ForbiddenAction action) : action_{action} {}
+    explicit FaultyHandle(ForbiddenAction action, Simulated device = Simulated{DeviceProfile{}})
+        : device_{std::move(device)}, action_{action} {}
     Opened open() { return device_.open(); }
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (++exchanges_ == 5) {
@@ -130,7 +134,7 @@ class FaultyHandle {
     void close() noexcept { device_.close(); }
 
   private:
-    SimulatedDevice device_{DeviceProfile{}};
+    Simulated device_;
     ForbiddenAction action_;
     int exchanges_ = 0;
 };
@@ -186,24 +190,17 @@ ForceModel velocity_model() {
                                    {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
 }
 
+constexpr double watched_rate_hz = 10'000.0;
+
 /// Runs the real control loop at 10 kHz with its real recorder. `before` runs in the loop's thread before the loop
 /// starts, `after` runs in the same thread after the loop ends.
-template <class ForbiddenAction, class Before, class After>
-Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before,
-                   After after, int predict = 0) {
-    Scheme scheme;
-    scheme.structure = kind;
-    scheme.predict = predict;
+template <class Control, class Before, class After>
+Counts watch_loop(Control& controller, Before before, After after) {
     LoopSettings settings;
-    settings.rate_hz = 10'000.0;
+    settings.rate_hz = watched_rate_hz;
     settings.duration_s = 0.1;
     settings.lowest_rate_share = 0.0;
     Counts counts;
-    FaultyHandle<ForbiddenAction> device{action};
-    EXPECT_TRUE(device.open());
-    Controller controller{
-        device, make_structure(rendered, scheme, 1.0 / settings.rate_hz, GuardSettings{}.force_limit),
-        guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
     RecordSinks sinks;
     using Recorder = FlightRecorder<TickRecord, RecordSinks>;
     Recorder recorder{sinks, 4096, std::chrono::milliseconds{5}};
@@ -236,6 +233,40 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenActi
     return counts;
 }
 
+template <class ForbiddenAction, class Before, class After>
+Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before,
+                   After after, int predict = 0) {
+    Scheme scheme;
+    scheme.structure = kind;
+    scheme.predict = predict;
+    FaultyHandle<ForbiddenAction> device{action};
+    EXPECT_TRUE(device.open());
+    Controller controller{
+        device, make_structure(rendered, scheme, 1.0 / watched_rate_hz, GuardSettings{}.force_limit),
+        guards_of(GuardSettings{}, rendered, scheme, 1.0 / watched_rate_hz)};
+    return watch_loop(controller, before, after);
+}
+
+/// Runs the loop of an admittance display.
+template <class ForbiddenAction, class Before, class After>
+Counts run_watched_pedal(StructureKind kind, ForbiddenAction action, Before before, After after) {
+    Scheme scheme;
+    scheme.structure = kind;
+    scheme.coupling = {0.0, 0.0};
+    DeviceProfile profile;
+    profile.period_s = 1.0 / watched_rate_hz;
+    profile.admittance = AdmittanceDisplay{.hand_stiffness = 10.0, .servo_bandwidth_hz = 50.0};
+    FaultyHandle device{action, SimulatedPedal<Hand>{profile}};
+    EXPECT_TRUE(device.open());
+    AdmittanceController controller{
+        device,
+        {make_structure(model(), scheme, profile.period_s, GuardSettings{}.force_limit), profile},
+        Guards{},
+        profile.force_limit,
+        1.0};
+    return watch_loop(controller, before, after);
+}
+
 template <class ForbiddenAction>
 Counts counted(ForbiddenAction action, StructureKind kind = StructureKind::Massless) {
     return run_watched(model(), kind, action, nothing, nothing);
@@ -263,6 +294,17 @@ TEST(RealTimePath, NoStructureAllocatesLocksOrThrows) {
             EXPECT_EQ(counts.exceptions, 0) << structure_names[static_cast<std::size_t>(kind)];
         }
     }
+}
+
+TEST(RealTimePath, NoPedalAllocatesLocksOrThrows) {
+    SKIP_UNDER_SANITIZERS();
+    for (const StructureKind kind :
+         {StructureKind::Implicit, StructureKind::Explicit, StructureKind::EnergyConsistent}) {
+        const Counts counts = run_watched_pedal(kind, nothing, nothing, nothing);
+        EXPECT_GT(counts.ticks, 0U);
+        EXPECT_EQ(counts.allocations + counts.locks + counts.exceptions, 0) << static_cast<int>(kind);
+    }
+    EXPECT_EQ(run_watched_pedal(StructureKind::Implicit, allocates, nothing, nothing).allocations, 2);
 }
 
 TEST(RealTimePath, CountersDetectAllocationsLocksAndExceptions) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/rendering/admittance.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +14,10 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/solver/newton.hpp"
+#include "palpate/solver/resolvent.hpp"
+#include "solvers/scene.hpp"
+#include "support.hpp"
 
 namespace palpate::admittance_tests {
 namespace {
@@ -118,6 +124,31 @@ TEST(Admittance, CommandIsAMultipleOfThePositionStepAndAheadByTheFeedForward) {
         EXPECT_NEAR(std::remainder(command.position, 1e-4), 0.0, 1e-12);
         if (k > 500) {  // speed F / B_o
             EXPECT_NEAR(command.position - command.object.environment_position, 0.01 * 4.0 / 20.0, 0.6e-4);
+        }
+    }
+}
+
+// The branch of a table is kept from step to step, and found again after a step that a limit ended elsewhere.
+TEST(Admittance, TableAndSearchMoveTheObjectEquallyAcrossFallsOfTheForce) {
+    const WaveletNetwork network = bench::two_clicks(16);
+    const Inertia light{4e-6, 0.001};  // a load line may have several solutions
+    const double p = light.load_line_slope(period);
+    LoadLineSolver search;
+    search.longest_step = 0.001;
+    search.max_evaluations = 5000;
+    test::Random random{3};
+    for (const double rate : {0.3, 3.0, 30.0, 1e9}) {
+        Admittance table{Implicit{network, light, none, period, Resolvent{network.curve(), p}},
+                         display({.rate_limit = rate})};
+        double before = 0.0;
+        double now = 0.0;
+        for (int k = 0; k < 3000; ++k) {
+            const double force = 2.0 - 2.5 * std::cos(0.004 * k) + test::uniform(random, -1.0, 1.0);
+            const double inertial = light.mass / (period * period);
+            const LoadLine line{p, force - inertial * before + (inertial + p) * now};
+            const double end = search.solve(network, {}, line, now).position;
+            before = std::exchange(now, std::clamp(end, now - rate * period, now + rate * period));
+            EXPECT_NEAR(table.step(force).position, now, 1e-8) << k;
         }
     }
 }

@@ -137,7 +137,8 @@ TEST(MustStop, AfterAFinalStatusOrMoreBadTicksThanTolerated) {
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
         const auto status = static_cast<Status>(k);
         const std::string word = text(status).word;
-        const bool at_once = word == "Fault" || word == "Jump" || word == "Frozen" || word == "Stale";
+        const bool at_once =
+            word == "Fault" || word == "Jump" || word == "Frozen" || word == "Stale" || word == "Saturated";
         const bool of_device = word == "Fault" || word == "Timeout" || word == "Lost";
         for (const std::uint64_t tolerated : {0U, 3U}) {
             for (std::uint64_t bad = 0; bad < 6; ++bad) {

@@ -12,7 +12,8 @@ namespace palpate {
 
 /// Command to a device: the force of the virtual object against the handle. A force > 0 pushes the handle towards
 /// smaller positions, out of the object. A device whose controller holds a line applies
-/// force + stiffness (x - position) at the handle's position x until the next command; other devices hold the force.
+/// force + stiffness (x - position) at the handle's position x until the next command; other devices hold the force. A
+/// position servo moves to `position`; with stiffness 0 it holds its last command.
 struct Command {
     double force = 0.0;      ///< force on the handle, at `position` [N or N*m]
     double position = 0.0;   ///< x0, position at which the line has the force [m or rad]
@@ -50,6 +51,7 @@ enum class ZeroForce : std::uint8_t {
     NotSent,    ///< zero force could not be sent
     Sent,       ///< zero force was sent; the device did not confirm it
     Confirmed,  ///< the device confirmed zero force
+    Held,       ///< a position servo held the last command until it was closed
 };
 
 /// A haptic device of one degree of freedom. `exchange` sends a force command and returns the next sample. It waits for

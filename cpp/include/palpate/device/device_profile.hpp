@@ -67,6 +67,8 @@ struct AdmittanceDisplay {
     std::optional<double> rate_limit = std::nullopt;
     double position_step = 0.0;
     double feed_forward_s = 0.0;
+    std::optional<double> drive_stiffness = std::nullopt;
+    std::optional<double> drive_damping = std::nullopt;
 
     [[nodiscard]] bool operator==(const AdmittanceDisplay&) const = default;
 };
@@ -100,7 +102,17 @@ inline constexpr auto fields_of<AdmittanceDisplay> = std::tuple{
     Field<&AdmittanceDisplay::feed_forward_s>{
         "feed_forward_s",
         "Time by which the command is ahead of the object's motion, to compensate the servo's lag [s].",
-        Rule::NotNegative}};
+        Rule::NotNegative},
+    Field<&AdmittanceDisplay::drive_stiffness>{
+        "drive_stiffness",
+        "Stiffness of the position control of a motor drive, which each command states [N*m/rad]; absent: "
+        "the servo has its own.",
+        Rule::Positive},
+    Field<&AdmittanceDisplay::drive_damping>{
+        "drive_damping",
+        "Damping of the position control of a motor drive [N*m*s/rad]; a moteus uses its own "
+        "servo.pid_position.kd. Absent: none.",
+        Rule::Positive}};
 /// Loop of a motor controller that holds a line, force + stiffness (x - position), between two commands (`Command`). The
 /// controller reads its own encoder at a higher rate than the host. The default is a controller of 20 kHz with a period
 /// of delay.

@@ -31,10 +31,11 @@ struct MitSettings {
     /// Time without a frame after which a Damiao drive ends its torque [s]; other makers: set it with their tool
     double watchdog_s = 0.02;
     bool makes_force = true;  ///< false: the drive is never enabled and only reports its position
+    double damping = 0.0;     ///< kd of commands with a stiffness [N*m*s/rad]
 };
 
 /// Frames of the MIT mode of Damiao, CubeMars and RobStride drives: torque = kp (p_0 - p) + kd (v_0 - v) + t_0 with
-/// kd = 0.
+/// v_0 = 0. kd is 0 without the position control of an admittance display.
 struct MitProtocol {
     using Settings = MitSettings;
 
@@ -43,7 +44,7 @@ struct MitProtocol {
 
     [[nodiscard]] static canfd_frame command_frame(const Settings& settings, const Command& command,
                                                    bool& is_limited) noexcept {
-        const mit::Line line = mit::line_of(command, settings.preset.ranges);
+        const mit::Line line = mit::line_of(command, settings.preset.ranges, settings.damping);
         is_limited = line.is_limited;
         return frame_to(settings.number, line.frame);
     }

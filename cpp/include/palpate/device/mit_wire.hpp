@@ -124,8 +124,9 @@ struct Line {
 ///
 /// Stiffness and position are rounded first, to the nearest step; the torque is then that of the line at the rounded
 /// position. The force at `position` is therefore exact to half a step of the torque. A number that is not finite
-/// makes zero torque.
-[[nodiscard]] inline Line line_of(const Command& command, const Ranges& ranges) noexcept {
+/// makes zero torque. A line has the damping `damping` about rest [N*m*s/rad].
+[[nodiscard]] inline Line line_of(const Command& command, const Ranges& ranges,
+                                  double damping = 0.0) noexcept {
     if (!(std::isfinite(command.force) && std::isfinite(command.position) &&
           std::isfinite(command.stiffness))) {
         return {frame_of({}, ranges), true};
@@ -141,7 +142,9 @@ struct Line {
         value_of(code_of(command.position + half_position, -ranges.position, ranges.position, position_bits),
                  -ranges.position, ranges.position, position_bits);
     const double force = command.force + stiffness * (position - command.position);
-    return {frame_of({position + half_position, 0.0, stiffness + half_stiffness, 0.0, half_torque - force},
+    const double damped =
+        damping > 0.0 && stiffness > 0.0 ? damping + 0.5 * step_of(0.0, ranges.damping, field_bits) : 0.0;
+    return {frame_of({position + half_position, 0.0, stiffness + half_stiffness, damped, half_torque - force},
                      ranges),
             command.stiffness < 0.0 || command.stiffness > ranges.stiffness ||
                 std::abs(force) > ranges.torque ||

@@ -29,9 +29,11 @@ struct MoteusSettings {
     /// torque is then zero; by default it brakes.
     double watchdog_s = 0.02;
     bool makes_force = true;  ///< false: the controller stays stopped and only reports its position
+    double damping = 0.0;     ///< above 0: commands with a stiffness use the KD of the controller
 };
 
-/// Registers of a moteus controller over CAN FD: torque = kp_scale KP (p_0 - p) + t_0. The scale of KD is 0.
+/// Registers of a moteus controller over CAN FD: torque = kp_scale KP (p_0 - p) + t_0. The scale of KD is 0, and 1
+/// in the position control of an admittance display.
 struct MoteusProtocol {
     using Settings = MoteusSettings;
 
@@ -42,6 +44,7 @@ struct MoteusProtocol {
         moteus::Line line = moteus::line_of(command, settings.kp, settings.torque_limit);
         is_limited = line.is_limited;
         line.fields.timeout_s = static_cast<float>(settings.watchdog_s);
+        line.fields.kd_scale = settings.damping > 0.0 && line.fields.kp_scale > 0.0F ? 1.0F : 0.0F;
         return frame_to(settings.number, moteus::frame_of(line.fields));
     }
     [[nodiscard]] static canfd_frame enable_frame(const Settings& settings) noexcept {

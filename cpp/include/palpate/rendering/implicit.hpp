@@ -65,7 +65,8 @@ class Implicit {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
-        memory_ = typename Solver::Memory{position};
+        memory_ = driven_ = typename Solver::Memory{position};
+        driven_to_ = position;
         before_ = position;
     }
 
@@ -82,8 +83,8 @@ class Implicit {
         const double force =
             coupling_.force(device - solution.position, velocity - (solution.position - position_) / period_);
         if (std::abs(force) > force_limit_) {
-            Rendered rendered =
-                drive_from(solution.position, std::copysign(force_limit_, force), solution.evaluations);
+            driven_ = typename Solver::Memory{solution.position};
+            Rendered rendered = drive_from(std::copysign(force_limit_, force), solution.evaluations);
             if (rendered.status == Status::NonFinite) {
                 return rendered;
             }
@@ -97,23 +98,31 @@ class Implicit {
 
     /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force (paper figure 12).
     [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
-        return drive_from(position_, force, 0, limits);
+        if (driven_to_ != position_) {
+            driven_ = typename Solver::Memory{position_};
+        }
+        return drive_from(force, 0, limits);
     }
 
   private:
     /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force. The search for the
-    /// object's new position starts at `start`.
-    [[nodiscard]] Rendered drive_from(double start, double force, int evaluations,
+    /// object's new position starts at the solution in `driven_`.
+    [[nodiscard]] Rendered drive_from(double force, int evaluations,
                                       const DriveLimits& limits = {}) noexcept {
+        bool again = false;
         const Solution solution =
             detail::limited_step(position_, force, limits, [&](double driving) noexcept {
                 const LoadLine line{uncoupled_slope_,
                                     driving - inertial_ * before_ + uncoupled_factor_ * position_};
-                typename Solver::Memory from{start};
-                return uncoupled_.solve(environment_, state_, line, from);
+                if (std::exchange(again, true)) {
+                    driven_ = typename Solver::Memory{position_};
+                }
+                const Solution found = uncoupled_.solve(environment_, state_, line, driven_);
+                driven_to_ = found.position;
+                return found;
             });
-        memory_ = typename Solver::Memory{position_};
         if (solution.status == Status::NonFinite) {
+            memory_ = typename Solver::Memory{position_};
             return detail::refused(position_);
         }
         memory_ = typename Solver::Memory{solution.position};
@@ -147,7 +156,9 @@ class Implicit {
     Solver uncoupled_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;  ///< x_{k-1}, last position of the device
+    typename Solver::Memory driven_;  ///< memory of the last step without the coupling
+    double driven_to_ = 0.0;  ///< end of that step before its limits; the memory holds for this position
+    double device_ = 0.0;     ///< x_{k-1}, last position of the device
 };
 
 /// Builds the implicit structure.

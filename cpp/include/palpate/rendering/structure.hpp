@@ -86,7 +86,11 @@ template <class Solve>
         end.evaluations += evaluations;
         end.position = std::min(end.position, from);
     }
-    end.position = std::clamp(end.position, from - limits.largest_step, from + limits.largest_step);
+    const double moved = end.position - from;
+    // A branch, because the next step would wait for the result of a minimum and a maximum
+    if (std::abs(moved) > limits.largest_step) [[unlikely]] {
+        end.position = from + std::copysign(limits.largest_step, moved);
+    }
     return end;
 }
 

@@ -99,7 +99,8 @@ struct LoopReport {
     /// zero force left the confirmation out.
     [[nodiscard]] bool orderly() const noexcept {
         return is_orderly(exit_reason) &&
-               (zero_force == ZeroForce::Confirmed || zero_force == ZeroForce::Commanded);
+               (zero_force == ZeroForce::Confirmed || zero_force == ZeroForce::Commanded ||
+                zero_force == ZeroForce::Held);
     }
     /// Returns the number of ticks, which is the number of records.
     [[nodiscard]] std::uint64_t ticks() const noexcept {
@@ -149,7 +150,7 @@ namespace detail {
 
 /// Runs the control loop: wake up, run a tick, pass the tick's record to `sink`. The loop runs until the duration ends,
 /// a stop is requested, a guard or the device ends the loop, the rate is too low, or a tick is later than the
-/// certificate allows. On every exit it sends zero force, closes the device and reports what the device confirmed.
+/// certificate allows. On every exit it sends zero force, or holds the position, closes the device and reports what the device confirmed.
 /// `clock` has start() and wait(); `sink`
 /// has push(record). Apart from the clock and the device's `exchange`, the loop does not allocate, lock, throw, log or
 /// make a system call.

@@ -135,6 +135,25 @@ template <class Protocol>
     return live;
 }
 
+/// Refuses an admittance display whose profile does not describe a drive: without a stiffness, or with finer steps of
+/// command or force than the drive has.
+inline void require_steps(const DeviceProfile& certified, const DeviceProfile& drive) {
+    const AdmittanceDisplay& display = *certified.admittance;
+    if (!display.drive_stiffness) {
+        refuse("the profile " + certified.id +
+               " has no admittance.drive_stiffness: a drive needs the stiffness of its position control in "
+               "each command");
+    }
+    if (display.position_step < drive.encoder_step * (1.0 - 1e-6)) {
+        refuse("admittance.position_step of the profile is " + readable(display.position_step) +
+               ": must be at least " + readable(drive.encoder_step) + " rad, the step of the drive");
+    }
+    if (certified.force_step < drive.force_step * (1.0 - 1e-6)) {
+        refuse("force_step of the profile is " + readable(certified.force_step) + ": must be at least " +
+               readable(drive.force_step) + " N*m, the step of the torque that the drive reports");
+    }
+}
+
 }  // namespace detail
 
 /// Opens a motor on a CAN bus for rendering. Throws std::invalid_argument with the reason if that is not possible.
@@ -145,7 +164,8 @@ template <class Protocol>
         refuse(model.units_text() + "; a drive rotates and needs a model in rad and N*m");
     }
     validate(options.loop);
-    const bool planned = !options.uncertified && model.certificate;
+    const bool positions = is_for_display(model);
+    const bool planned = positions || (!options.uncertified && model.certificate);
     if constexpr (requires { settings.torque_limit; }) {
         settings.torque_limit = options.force_limit.value_or(planned ? model.certificate->device.force_limit
                                                                      : settings.torque_limit);
@@ -153,7 +173,13 @@ template <class Protocol>
     if (planned && model.certificate->device.held_line) {
         settings.watchdog_s = model.certificate->device.held_line->watchdog_s.value_or(settings.watchdog_s);
     }
+    if (positions) {
+        settings.damping = model.certificate->device.admittance->drive_damping.value_or(0.0);
+    }
     auto live = detail::live_motor<Protocol>(std::move(settings), options.loop.rate_hz);
+    if (positions) {
+        detail::require_steps(model.certificate->device, live->profile);
+    }
     if (planned) {
         // A drive reports neither inertia, damping, friction nor delay: those of the certificate are used
         const DeviceProfile of_drive = std::exchange(live->profile, model.certificate->device);

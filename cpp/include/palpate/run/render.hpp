@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,11 +20,13 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/admittance.hpp"
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/admittance_controller.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/record_sinks.hpp"
@@ -138,6 +141,11 @@ struct RenderJob {
 [[nodiscard]] inline bool follows_certificate(const RenderOptions& options,
                                               const PlannedModel& model) noexcept {
     return model.certificate && !options.uncertified && !changes_plan(options);
+}
+
+/// Returns true if the plan is for an admittance display. It is rendered as planned only, also without its certificate.
+[[nodiscard]] inline bool is_for_display(const PlannedModel& model) noexcept {
+    return model.certificate && model.certificate->device.admittance;
 }
 
 /// Returns true if the certificate limits the energy that a hand can take out.
@@ -343,18 +351,32 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     loop.rate_hz = device.rate_hz;
     loop.tolerated = options.tolerated.value_or(loop.tolerated);
     const bool on_device = rendered_by_device(options, model);
+    if (device.profile.admittance) {
+        sinks.force = RecordedForce::Applied;
+        job.guards.ramp_s = 0.0;
+        job.notes.emplace_back("the force of the handle moves the object; the recorded force is that force");
+    }
     if (on_device) {
         sinks.force = RecordedForce::Applied;
         job.notes.emplace_back(
             "the device renders the model; the host watches and records the force of its motor");
     } else if (reason.empty()) {
         detail::apply_certificate(*model.certificate, job.guards, loop);
+        if (device.simulated && device.profile.admittance) {
+            // The certificate needs a constant period. The simulated time has it, the time of the host never has
+            loop.lowest_rate_share = options.loop.lowest_rate_share;
+            loop.longest_period_s = std::numeric_limits<double>::infinity();
+        }
     } else if (model.certificate && device.simulated) {
         job.notes.push_back("uncertified: " + reason);
     }
     validate(loop);
     validate(job.guards);
-    validate(job.scheme, job.model, on_device ? model.certificate->device.period_s : 1.0 / loop.rate_hz);
+    if (device.profile.admittance) {
+        validate(job.scheme, job.model);
+    } else {
+        validate(job.scheme, job.model, on_device ? model.certificate->device.period_s : 1.0 / loop.rate_hz);
+    }
     if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
             "the model has no plan: rendered behind the default coupling, which makes the object softer; "
@@ -380,17 +402,46 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     return job;
 }
 
+namespace detail {
+
+/// Returns the controller of a rendering on an open admittance display.
+[[nodiscard]] inline AdmittanceController<LiveDevice> admittance_controller(const RenderJob& job,
+                                                                            LiveDevice& device,
+                                                                            double period_s) {
+    require(
+        is_uncoupled(job.scheme),
+        "structure is " + std::string(name_of(job.scheme.structure)) +
+            ": an admittance display renders an object with mass and without a coupling; make a plan with "
+            "'palpate plan'");
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    Guards guards = guards_of(job.guards, job.model, job.scheme, period_s);
+    // A position servo may stop within a period, so a position that stays constant does not show a fault
+    guards.reading = ReadingGuard{
+        {.largest_step = job.guards.largest_speed * period_s, .longest_delay = job.guards.longest_delay_s}};
+    return {device,
+            {make_structure(job.model, job.scheme, period_s, infinite), device.profile},
+            guards,
+            device.profile.force_limit,
+            device.profile.admittance->drive_stiffness.value_or(1.0)};
+}
+
+}  // namespace detail
+
 /// Renders a model on an open device until the control loop ends, then closes the device and returns the summary.
 [[nodiscard]] inline Summary render(const RenderOptions& options, const PlannedModel& model,
                                     const RenderJob& job, LiveDevice& device, RecordSinks& sinks,
                                     const std::atomic<bool>& stop_requested, const Watch& watch) {
     const double period_s = 1.0 / job.session.loop.rate_hz;
-    const auto run = [&](AnyStructure structure, const Guards& guards) {
-        Controller controller{device, std::move(structure), guards};
+    const auto session = [&](auto controller) {
         return run_session(controller, job.session, sinks, stop_requested, watch);
     };
+    const auto run = [&](AnyStructure structure, const Guards& guards) {
+        return session(Controller<LiveDevice>{device, std::move(structure), guards});
+    };
     const Domain& domain = model.model.domain();
-    SessionReport report = rendered_by_device(options, model)
+    SessionReport report = device.profile.admittance
+                               ? session(detail::admittance_controller(job, device, period_s))
+                           : rendered_by_device(options, model)
                                ? run(Watching{domain}, Guards{.reading = reading_guard(job.guards, period_s),
                                                               .limit = force_limit(job.guards),
                                                               .ramp = force_ramp(job.guards, period_s)})

@@ -72,8 +72,8 @@ using Watch = std::function<void(const SessionView&)>;
 
 /// Runs the control loop on an open device until the loop ends. When it returns, the device is closed,
 /// `LoopReport::zero_force` states its force, and `sinks` has received the records of all ticks, except lost ones.
-template <Device D>
-[[nodiscard]] SessionReport run_session(Controller<D>& controller, const SessionSettings& settings,
+template <class Control>
+[[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
                                         RecordSinks& sinks, const std::atomic<bool>& stop_requested,
                                         const Watch& watch) {
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));

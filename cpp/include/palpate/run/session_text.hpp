@@ -47,6 +47,8 @@ namespace palpate {
         case ZeroForce::Sent:
             return "zero force sent, but not confirmed by the device: switch the motor off if it still "
                    "pushes";
+        case ZeroForce::Held:
+            return "position held, device closed";
         case ZeroForce::Confirmed:
             break;
     }

@@ -93,7 +93,9 @@ class Faulty {
 
     [[nodiscard]] Reading faulty(const Fault& fault, const Command& command) noexcept {
         const bool half = fault.kind == FaultKind::Saturated;
-        Reading now = device_.exchange({half ? 0.5 * command.force : command.force});
+        Command sent = command;
+        sent.force *= half ? 0.5 : 1.0;
+        Reading now = device_.exchange(sent);
         Reading reported = now;
         switch (fault.kind) {
             case FaultKind::Late:

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 
+#include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/dynamics/servo.hpp"
 #include "palpate/rendering/admittance.hpp"
 #include "palpate/simulation/hand.hpp"
+#include "palpate/status.hpp"
 
 namespace palpate {
 
@@ -80,5 +83,48 @@ class SimulatedDisplay {
     double command_ = 0.0;
     std::uint64_t tick_ = 0;
 };
+
+/// A simulated admittance display with a hand, as a device. A command with a stiffness moves the servo to its position;
+/// without a stiffness, or with a number that is not finite, the servo holds its last command. The sensor measures forces
+/// up to the force limit of the profile.
+template <SimulatedHand H>
+class SimulatedPedal {
+  public:
+    explicit SimulatedPedal(DeviceProfile profile, H hand = {}, double start = 0.0)
+        : profile_{std::move(profile)}, hand_{hand}, start_{start}, display_{profile_, start} {}
+
+    /// Opens the simulated device: sets handle and command to the start position.
+    Opened open() {
+        display_ = SimulatedDisplay{profile_, start_};
+        command_ = start_;
+        tick_ = 0;
+        return {};
+    }
+
+    /// Simulates one period, and reads handle and sensor at its end.
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        if (command.stiffness != 0.0 && std::isfinite(command.position)) {
+            command_ = command.position;
+        }
+        display_.move(command_);
+        const double time = static_cast<double>(++tick_) * profile_.period_s;
+        const Motion handle = display_.handle();
+        const double force = std::clamp(display_.measured(display_.force(hand_.grip(time, handle))),
+                                        -profile_.force_limit, profile_.force_limit);
+        return {handle.position, handle.velocity, force, force, time, tick_, Status::Ok, profile_.delay_s};
+    }
+
+    ZeroForce close() noexcept { return ZeroForce::Held; }
+
+  private:
+    DeviceProfile profile_;
+    H hand_;
+    double start_;
+    SimulatedDisplay display_;
+    double command_ = 0.0;
+    std::uint64_t tick_ = 0;
+};
+
+static_assert(Device<SimulatedPedal<Hand>>);
 
 }  // namespace palpate

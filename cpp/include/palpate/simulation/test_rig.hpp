@@ -106,6 +106,30 @@ namespace detail {
     return rig;
 }
 
+/// Returns a hand for an admittance display with the stiffness and damping of the profile. It moves the handle through
+/// the model's domain, except 1 % at both ends, as far as the force stays below 80 % of the sensor's range.
+[[nodiscard]] inline Hand pedal_hand(const ForceModel& model, const DeviceProfile& device, Hand hand) {
+    constexpr int steps = 1000;
+    const AdmittanceDisplay& display = *device.admittance;
+    if (!(display.hand_stiffness > 0.0)) {
+        return hand;
+    }
+    const double lower = model.domain().lower[0];
+    const double travel = model.domain().upper[0] - lower;
+    std::vector<double> inwards;
+    for (int k = 0; k <= steps; ++k) {
+        inwards.push_back(lower + travel * (0.01 + 0.98 * k / steps));
+    }
+    Scheme direct;
+    direct.structure = StructureKind::Direct;
+    const std::vector<Rendered> rendered = motion_driven(model, direct, inwards, device.period_s);
+    hand.stiffness = display.hand_stiffness;
+    hand.damping = display.hand_damping;
+    hand.lower = inwards.front() + rendered.front().force / hand.stiffness;
+    hand.upper = detail::resting_target(rendered, inwards, device.force_limit, hand.stiffness);
+    return hand;
+}
+
 /// Returns a function that gives the force of a model at a position, as an object that can be mounted on the handle of
 /// the simulated device. The object is at rest at the position `start`.
 [[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const TestRig& rig,

@@ -42,9 +42,13 @@ class AdmittanceNeed {
     [[nodiscard]] double at(double theta) const noexcept { return bound(theta, 0.0); }
 
     /// Returns an upper bound, within about 1e-6, of the largest need(theta) - (m / T^2)(1 - cos theta) over all
-    /// frequencies; `inertial` is m / T^2. The search divides intervals of theta until Taylor's formula proves that no
-    /// frequency in an interval exceeds the largest value found by more than the tolerance. Infinite if the servo
-    /// oscillates too long to be summed.
+    /// frequencies; `inertial` is m / T^2. The search divides intervals of theta until no frequency in an interval can
+    /// exceed the largest value found by more than the tolerance. Infinite if the servo oscillates too long to be summed.
+    ///
+    /// At the frequency t of the largest value the derivative is zero, so the slopes w g'(t) of the sums g that are
+    /// positive there add to `inertial` sin t. Taylor's formula about t then gives, with the middle m of an interval of
+    /// half length h that contains t, sum of w g(t) <= sum of w (g(m) + c h^2 / 2) + (t - m) `inertial` sin t. The last
+    /// term is at most `inertial` (cos(m - h) - cos t), because the sine is concave.
     [[nodiscard]] double largest(double inertial) const {
         struct Part {
             double middle, half;
@@ -93,57 +97,34 @@ class AdmittanceNeed {
     }
 
   private:
-    /// A complex function of theta with its derivative by theta.
-    struct Dual {
-        std::complex<double> value = 0.0;
-        std::complex<double> slope = 0.0;
-
-        friend Dual operator+(const Dual& a, const Dual& b) noexcept {
-            return {a.value + b.value, a.slope + b.slope};
-        }
-        friend Dual operator-(const Dual& a, const Dual& b) noexcept {
-            return {a.value - b.value, a.slope - b.slope};
-        }
-        friend Dual operator*(const Dual& a, const Dual& b) noexcept {
-            return {a.value * b.value, a.slope * b.value + a.value * b.slope};
-        }
-        friend Dual operator*(double a, const Dual& b) noexcept { return {a * b.value, a * b.slope}; }
-        friend Dual operator/(const Dual& a, const Dual& b) noexcept {
-            const std::complex<double> quotient = a.value / b.value;
-            return {quotient, (a.slope - quotient * b.slope) / b.value};
-        }
-    };
-
-    /// Returns an upper bound of the need at all frequencies within `half` of theta, with Taylor's formula for each of
-    /// the three sums; for `half` = 0 the need itself.
+    /// Returns the need at theta with 1/2 c half^2 added to each of the three sums; c is the bound of the sum's second
+    /// derivative. For `half` = 0 this is the need itself.
     [[nodiscard]] double bound(double theta, double half) const noexcept {
-        const std::complex<double> unit = std::polar(1.0, -theta);
-        const Dual back{unit, {unit.imag(), -unit.real()}};
-        const Dual one{1.0, 0.0};
-        Dual waiting;
-        Dual power = back;
+        using Complex = std::complex<double>;
+        const Complex back = std::polar(1.0, -theta);
+        Complex waiting = 0.0;
+        Complex power = back;
         for (int j = 0; j < delay_; ++j) {
-            waiting = waiting + power;
-            power = power * back;
+            waiting += power;
+            power *= back;
         }
         // The deviations after the delay are a geometric series: the sum is (1 - transition / z)^-1 of the first one
         const auto& a = transition_;
-        const Dual position_left = one - a[0] * back;
-        const Dual velocity_left = one - a[3] * back;
-        const Dual determinant = position_left * velocity_left - (a[1] * a[2]) * (back * back);
-        const Dual x =
-            power * (first_.position * velocity_left + (a[1] * first_.velocity) * back) / determinant;
-        const Dual v =
-            power * ((a[2] * first_.position) * back + first_.velocity * position_left) / determinant;
-        const Dual forward = one + ahead_ * (one - back);
+        const Complex position_left = 1.0 - a[0] * back;
+        const Complex velocity_left = 1.0 - a[3] * back;
+        const Complex determinant = position_left * velocity_left - a[1] * a[2] * back * back;
+        const Complex x =
+            power * (first_.position * velocity_left + a[1] * first_.velocity * back) / determinant;
+        const Complex v =
+            power * (a[2] * first_.position * back + first_.velocity * position_left) / determinant;
+        const Complex forward = 1.0 + ahead_ * (1.0 - back);
         // The deviations are 1 - sigma, so the sums of their derivatives are -D1 and -D2
-        const std::array<Dual, 3> sums{
-            0.5 * one + forward * (waiting + x) - ahead_ * back, forward * v,
+        const std::array<Complex, 3> sums{
+            0.5 + forward * (waiting + x) - ahead_ * back, forward * v,
             forward * (servo_.acceleration({1.0, 0.0}) * x + servo_.acceleration({0.0, 1.0}) * v)};
         double need = step_slope_;
         for (std::size_t k = 0; k < sums.size(); ++k) {
-            const double highest = sums[k].value.real() + std::abs(sums[k].slope.real()) * half +
-                                   (half > 0.0 ? 0.5 * curvature_[k] * half * half : 0.0);
+            const double highest = sums[k].real() + (half > 0.0 ? 0.5 * curvature_[k] * half * half : 0.0);
             need += limits_[k] == 0.0 ? 0.0 : limits_[k] * std::max(0.0, highest);
         }
         return need;

@@ -23,6 +23,7 @@
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/open_device.hpp"
 #include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/simulated_display.hpp"
 #include "palpate/simulation/test_rig.hpp"
 
 // Definitions of the functions that open every kind of device. The libraries of the devices take long to compile.
@@ -32,7 +33,7 @@ namespace palpate {
 /// plan, otherwise the default knob, scaled to the model.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
-    const bool planned = follows_certificate(options, model);
+    const bool planned = is_for_display(model) || follows_certificate(options, model);
     const double rate_hz = planned ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
         refuse("rate_hz is " + readable(options.loop.rate_hz) + ", but the certificate is for " +
@@ -54,9 +55,18 @@ namespace palpate {
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
     }
-    auto live = std::make_unique<LiveDeviceOf<Faulty<SimulatedDevice>>>(
-        Faulty{SimulatedDevice{rig.device, rig.hand, simulated_substeps(period_s)}, faults,
-               3.0 * largest_speed * period_s});
+    const double jump = 3.0 * largest_speed * period_s;
+    std::unique_ptr<LiveDevice> live;
+    if (rig.device.admittance) {
+        rig.hand = pedal_hand(model.planned(), rig.device, rig.hand);
+        const Domain& domain = model.model.domain();
+        const double start = domain.lower[0] + 0.01 * (domain.upper[0] - domain.lower[0]);
+        live = std::make_unique<LiveDeviceOf<Faulty<SimulatedPedal<Hand>>>>(
+            Faulty{SimulatedPedal{rig.device, rig.hand, start}, faults, jump});
+    } else {
+        live = std::make_unique<LiveDeviceOf<Faulty<SimulatedDevice>>>(
+            Faulty{SimulatedDevice{rig.device, rig.hand, simulated_substeps(period_s)}, faults, jump});
+    }
     if (const Opened opened = live->open(); !opened) {
         refuse(opened.reason);
     }
@@ -118,9 +128,17 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& opti
             " Hz: set device to a USB device that contains the exported model, or make a plan for the host "
             "with 'palpate plan' without on_device");
     }
-    if (model.certificate && model.certificate->device.admittance) {
-        refuse(model.name + " is planned for the admittance display " + model.certificate->device.id +
-               ": palpate-control renders on devices that apply forces; simulate it with 'palpate simulate'");
+    if (is_for_display(model)) {
+        const std::string planned =
+            model.name + " is planned for the admittance display " + model.certificate->device.id;
+        if (kind != "simulated" && kind != "mit" && kind != "moteus") {
+            refuse(
+                planned + ", but a device '" + options.device +
+                "' applies forces: set device to simulated, mit or moteus, or make a plan for this device");
+        }
+        if (changes_plan(options)) {
+            refuse(planned + ": render it with its plan, without options that change it");
+        }
     }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
