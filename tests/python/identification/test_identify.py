@@ -13,7 +13,6 @@ from conftest import sampled
 from imperfect import loop, press_and_release
 from palpate import InputError, Model, Recording, identify
 from palpate._core.model import play
-from palpate.recording.roles import Role, roles_of
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -123,10 +122,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
     """Fits both strokes without every fifth row; returns the NRMSE on the omitted rows, and the model."""
     kept, held = palpate.read_recording(path).split(every=5)
     model = identify(kept, **options)
-    assert held.direction is not None
-    rows = (held.direction != 0) & (roles_of(held) == Role.MOVING)
-    error = model.force(held.position[rows], direction=held.direction[rows].astype(float)) - held.force[rows]
-    return float(np.sqrt(np.mean(error**2)) / np.std(held.force[rows])), model
+    return palpate.verify(model, held).nrmse, model
 
 
 @pytest.mark.parametrize("bounded", sampled([True, False], True), ids=["h-nonnegative", "h-free"])

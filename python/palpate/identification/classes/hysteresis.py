@@ -12,7 +12,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._typing import Float1D
 from ...errors import InputError
 from ...recording.motion import noise_band
 from ...verdict import usable
@@ -96,7 +95,7 @@ class Hysteresis(ModelClass):
             report.decisions[:], selection.start_basis = before, dict(start)
             of_order, before = self._of(below, order, first=basis), list(report.decisions)
         of_play, of_its_fit = None, (list[Decision](), dict(start))
-        for strokes in play.best_of_options(basis, data.order):
+        for strokes in play.best_of_options(basis):
             report.decisions[:], selection.start_basis = before, dict(start)
             found = self._of(below, strokes, play, first=basis)
             if of_play is None or self._fits_better(found, of_play):
@@ -275,10 +274,10 @@ class PlaySearch:
         self._noise = noise_band(data.path[:, 0])
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    def best_of_options(self, basis: Basis, order: Float1D | None) -> list[HysteresisInput]:
+    def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given
         wavelets is smaller than at its neighbours. A radius within the noise of the position must also have a
-        smaller error than the `order` of rows (n,).
+        smaller error than the order of rows.
 
         Wavelets that fit the rows after a turn can make a wrong radius the best one. Returns none if the
         motions between gaps of time are too short for every play radius, or never reverse: with one stroke
@@ -286,8 +285,7 @@ class PlaySearch:
         """
         if not self._usable:
             return []
-        known = self._thinned(self._usable[-1])
-        least = math.inf
+        known, order, least = self._thinned(self._usable[-1]), self._samples.data.order, math.inf
         if order is not None:
             known &= order != 0.0
             least = self._residual_squares(HysteresisInput(order, known), basis, known)
