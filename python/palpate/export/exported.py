@@ -167,7 +167,7 @@ class Exported:
             )
         if not self.has_certificate:
             findings.append(
-                usable("the model has no certificate: nothing is proved about stability on a device")
+                usable("the program has no certificate: nothing is proved about stability on a device")
             )
         return Verdict(tuple(findings))
 
