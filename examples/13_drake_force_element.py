@@ -9,8 +9,7 @@ switch of 3 g. Without Drake (``pip install drake``, 167 MB) this example draws 
 
 import matplotlib.pyplot as plt
 
-import palpate
-from palpate.plotting import plot
+import palpate.plotting
 
 try:
     import pydrake.all as drake
@@ -52,7 +51,7 @@ def press(integrator, step):
 # %%
 # The explicit method diverges with steps of 5 ms. The implicit methods are stable.
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 4), layout="constrained")
-plot(switch, left)
+palpate.plotting.plot(switch, left)
 right.set(xlabel="time [steps of 5 ms]", ylabel="position [mm]", ylim=(0.0, 6.0))
 if drake:
     exact = press("runge_kutta3", 2e-5)[::250]

@@ -66,9 +66,10 @@ class Prediction:
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
     """Returns the model's force along a recording.
 
-    If a play radius is known, and the rows are in the order of a motion, the play operator follows their
-    positions: near a turn, s = +-1 is not the state that the model was identified with. Otherwise s = +-1 is
-    the direction of the recording, or of the order of rows; rows without direction are left out. A memory
+    If model or flight record have a play radius, and the rows are in the order of a motion, the play operator
+    follows their positions: near a turn, s = +-1 is not the state that the model was identified with.
+    Otherwise s = +-1 is the direction of the recording, or of the order of rows; rows without direction are
+    left out. A memory
     follows the positions over the time of the recording, from rest. The play radius is the first one
     available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 % of the
     travel. A flight record behind a virtual coupling is compared at the position of the virtual object,
@@ -200,7 +201,8 @@ class _State:
 
 
 def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius: float | None) -> _State:
-    followed = play_radius is not None or (_known_radius(model, flight) and states_its_order(recording))
+    identified = flight.play_radius or model.play_radius  # a plan can render with a wider one
+    followed = play_radius is not None or (identified and states_its_order(recording))
     if recording.direction is not None and not followed:
         rows = recording.direction != 0
         if not rows.any():

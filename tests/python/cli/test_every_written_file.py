@@ -58,7 +58,7 @@ WITHOUT_FILES = {"app", "devices"}
 
 INPUTS = {
     "model_file", "recording_file", "recording_files", "file", "other_file", "object_file", "profile",
-    "source", "identified_on",
+    "source", "identified_on", "fresh",
 }  # fmt: skip
 """Parameters of verbs that name a file to read."""
 

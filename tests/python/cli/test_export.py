@@ -108,7 +108,7 @@ def test_uncertified_header_says_so_and_compares_nothing(
     options = ["--uncertified", "--encoder-step", 1e-4, "--force-limit", 1.5]
     result = exported_json(capsys, "export", model, "--c", *options, "-o", header)
     assert result["code"] == 0
-    assert str(result["verdict"]).startswith("usable: the model has no certificate")
+    assert str(result["verdict"]).startswith("usable: the program has no certificate")
     assert (result["force_limit"], result["needed_friction"]) == (1.5, 0.0)
     text = header.read_text(encoding="utf-8")
     assert "No certificate" in text
@@ -212,7 +212,7 @@ def test_program_whose_rounding_breaks_the_certificate_is_refused_with_the_cure(
     assert "for the errors of the program" in " ".join(capsys.readouterr().out.split())
 
     assert export(exact, "--uncertified") == 0
-    assert capsys.readouterr().out.startswith("verdict: usable\n  the model has no certificate")
+    assert capsys.readouterr().out.startswith("verdict: usable\n  the program has no certificate")
     text = header.read_text(encoding="utf-8")
     assert "No certificate" in text
     assert "#define knob_CERTIFICATE_FINGERPRINT UINT64_C(0x0)" in text

@@ -431,7 +431,9 @@ def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixtur
     text = capsys.readouterr().out
     for name, (file, _) in example_profiles().items():
         assert f"{name}  {file}\n" in text
-    assert "data sheet" in text
+    assert "data sheet" not in text
+    assert main(["plan", "--examples", "--verbose"]) == 0
+    assert "data sheet" in capsys.readouterr().out
 
 
 def test_the_locus_is_drawn(here: Path) -> None:

@@ -13,7 +13,8 @@ import pytest
 
 import control_program
 import palpate
-from mit_drive import Drive, emulated
+from can_motor import emulated
+from mit_drive import Drive
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile, InputError, Recording
 from palpate.cli.main import main
