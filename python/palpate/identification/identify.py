@@ -96,7 +96,7 @@ def identify(
         Recordings of one of several objects.
     ``--output`` : :meth:`palpate.Model.save`
         Model file to write.
-    ``--plot`` : :meth:`palpate.Verification.plot`
+    ``--plot`` : :func:`palpate.plotting.plot`
         Draws force over position, and the residuals.
     ``--hold-out-every`` : :meth:`palpate.Recording.split`
         Holds out every K-th row (K >= 2), for :func:`palpate.verify`.
