@@ -87,7 +87,7 @@ class Request:
     def identifier(self) -> str:
         """Returns the name of the model, which is a C identifier.
 
-        Without `name` it is that of the output file. One that is reserved, or cannot be a name, gets a prefix.
+        Without `name` it is that of the output file; a reserved word gets a prefix.
 
         Raises
         ------
