@@ -13,7 +13,6 @@ Writes FOLDER/figures/held-objects.json, and the tables of FOLDER/held-lines.md 
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -24,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.plans.renderable_pairs import model_of, recordings
+from bench.plans.renderable_pairs import model_of, options_of, recordings
 from bench.studies import fill_tables, markdown_table, measured_data, write_json
 
 from palpate import DeviceProfile, Model, Scheme
@@ -212,18 +211,9 @@ def tables(pairs: Sequence[Pair], curves: Sequence[Curve]) -> dict[str, str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--to", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=4)
-    parser.add_argument("--models", type=Path)
-    options = parser.parse_args()
-    folder = measured_data()
+    options, folder = options_of(__doc__, every=4), measured_data()
     if folder is None:
         return 0
-    if options.models is not None:
-        options.models.mkdir(parents=True, exist_ok=True)
     every = recordings(folder)
     curve = model_of(next(file for _, file in every if file.stem == CURVE), options.models)
     curves = [curve_on(curve, device) for device in devices()]

@@ -130,19 +130,24 @@ def tables(pairs: list[Pair], omitted: list[str]) -> dict[str, str]:
     }
 
 
-def main() -> int:
+def options_of(description: str | None, every: int) -> argparse.Namespace:
+    """Returns the options of a study of every k-th measured object: folders of pages and models, and k."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--to", type=Path, required=True)
-    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--every", type=int, default=every)
     parser.add_argument("--models", type=Path)
     options = parser.parse_args()
-    folder = measured_data()
-    if folder is None:
-        return 0
     if options.models is not None:
         options.models.mkdir(parents=True, exist_ok=True)
+    return options
+
+
+def main() -> int:
+    options, folder = options_of(__doc__, every=1), measured_data()
+    if folder is None:
+        return 0
     profiles = [DeviceProfile.load(file) for file, _ in example_profiles().values()]
     devices = [each for each in profiles if each.position_unit == "m" and each.admittance is None]
     pairs, omitted = [], []
