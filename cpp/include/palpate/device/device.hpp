@@ -85,4 +85,15 @@ inline constexpr bool paces_host = [] {
     }
 }();
 
+/// Returns true if the clock of this device sets the rate of the control loop; a device that knows this only while it
+/// runs has a member `sets_pace`.
+template <Device D>
+[[nodiscard]] constexpr bool sets_pace(const D& device) noexcept {
+    if constexpr (requires { device.sets_pace(); }) {
+        return device.sets_pace();
+    } else {
+        return paces_host<D>;
+    }
+}
+
 }  // namespace palpate

@@ -23,8 +23,9 @@ namespace palpate {
 template <Device D>
 class AdmittanceController {
   public:
-    /// Of the guards, the check of the readings and the sums of energy are used. `largest_force` is the range of the force sensor [N or N*m]; `stiffness` is that of the position servo, which a
-    /// motor controller needs in each command [N/m or N*m/rad].
+    /// Of the guards, the check of the readings and the sums of energy are used. `largest_force` is the range of the
+    /// force sensor [N or N*m]; `stiffness` is that of the position servo, which a motor controller needs in each
+    /// command [N/m or N*m/rad].
     AdmittanceController(D& device, Admittance source, Guards guards, double largest_force, double stiffness)
         : device_{device},
           source_{std::move(source)},
@@ -72,13 +73,7 @@ class AdmittanceController {
     }
 
     /// Returns true if the device's clock sets the rate of the control loop.
-    [[nodiscard]] bool paced_by_device() const noexcept {
-        if constexpr (requires { device_.sets_pace(); }) {
-            return device_.sets_pace();
-        } else {
-            return paces_host<D>;
-        }
-    }
+    [[nodiscard]] bool paced_by_device() const noexcept { return sets_pace(device_); }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 

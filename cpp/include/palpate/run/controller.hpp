@@ -78,13 +78,7 @@ class Controller {
     }
 
     /// Returns true if the device's clock sets the rate of the control loop.
-    [[nodiscard]] bool paced_by_device() const noexcept {
-        if constexpr (requires { device_.sets_pace(); }) {
-            return device_.sets_pace();
-        } else {
-            return paces_host<D>;
-        }
-    }
+    [[nodiscard]] bool paced_by_device() const noexcept { return sets_pace(device_); }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
