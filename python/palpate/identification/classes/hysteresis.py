@@ -78,11 +78,10 @@ class Hysteresis(ModelClass):
         return has_direction and (inputs == "auto" or "hysteresis" in inputs)
 
     def better(self, below: Candidate) -> Candidate:
-        selection, data, report = self._selection, self._selection.data, self._selection.report
+        selection, data = self._selection, self._selection.data
         if data.side is not None:
-            return self._of(below, HysteresisInput.of_strokes(data.side))
-        play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
-        start, before = dict(selection.start_basis), list(report.decisions)
+            return self._chosen(below, self._free(below, HysteresisInput.of_strokes(data.side)))
+        play, basis, best = PlaySearch(selection.samples, selection.options), below.solution.basis, None
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
             # The direction can also change at once at a turn. Wavelets of strokes without their reversals
             # show the radius; those of all rows would fit the reversals.
@@ -91,40 +90,34 @@ class Hysteresis(ModelClass):
                 data, force=parallel_behind_turns(data.path[:, 0], data.force, data.order * data.fitted)
             )
             samples = Samples(settled, selection.options, selection.cells)
-            basis = self._of(below, order, samples=samples).solution.basis
-            report.decisions[:], selection.start_basis = before, dict(start)
-            of_order, before = self._of(below, order, first=basis), list(report.decisions)
-        of_play, of_its_fit = None, (list[Decision](), dict(start))
+            basis = self._free(below, order, samples=samples).solution.basis
+            best = self._free(below, order, first=basis)
         for strokes in play.best_of_options(basis):
-            report.decisions[:], selection.start_basis = before, dict(start)
-            found = self._of(below, strokes, play, first=basis)
-            if of_play is None or self._fits_better(found, of_play):
-                of_play, of_its_fit = found, (list(report.decisions), selection.start_basis)
-        # A play radius is one more number than the order of rows.
-        evidence = selection.options.search.evidence
-        if of_order is not None and (of_play is None or self._fits_better(of_order, of_play, evidence)):
-            report.decisions[:] = before
-            selection.start_basis = {**start, self.name: of_order.solution.basis}
-            return of_order
-        if of_play is not None:
-            report.decisions[:], selection.start_basis = of_its_fit
-            return of_play
+            found = self._free(below, strokes, play, first=basis)
+            best = found if best is None or self._fits_better(found, best) else best
+        if best is not None:
+            return self._chosen(below, best)
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
-        report.decisions.append(Decision("hysteresis", "not tested", untested))
+        selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
-    def _fits_better(self, one: Candidate, other: Candidate, margin: float = 0.0) -> bool:
-        """True if the criterion of the first of two candidates is smaller, or larger by at most `margin`, on
-        the rows that both can use."""
+    def _fits_better(self, one: Candidate, other: Candidate) -> bool:
+        """True if the criterion of the first of two candidates is smaller on the rows that both can use. A
+        play radius must lower it as much as a model class, compared with the order of rows."""
         weight = one.error_on(one.data.weight).weight * (other.error_on(None).weight > 0.0)
-        name = self._selection.judge.criterion
+        name, evidence = self._selection.judge.criterion, self._selection.options.search.evidence
         if name in ON_HELD_OUT_ROWS:
             name = "bic"
-        return one.on_rows(name, weight) <= other.on_rows(name, weight) + margin
 
-    def _of(
+        def value(candidate: Candidate) -> float:
+            assert candidate.strokes is not None
+            return candidate.on_rows(name, weight) + evidence * (candidate.strokes.play_radius is not None)
+
+        return value(one) < value(other)
+
+    def _free(
         self,
         below: Candidate,
         strokes: HysteresisInput,
@@ -132,24 +125,31 @@ class Hysteresis(ModelClass):
         samples: Samples | None = None,
         first: Basis | None = None,
     ) -> Candidate:
-        """Returns the better of the simpler candidate and a network with hysteresis for given direction
-        states, or for those of the best play radius if `play` searches it.
+        """Returns a network with hysteresis, without constraints, for given direction states, or for those of
+        the best play radius if `play` searches it.
 
         A hysteresis h >= 0 has a mean, which a fit with the wavelets `first`, by default those of the simpler
         candidate, already shows.
         If the criterion does not decrease with these wavelets, and the options do not name hysteresis, no
         network with hysteresis is grown.
         """
-        selection, judge, named = self._selection, self._selection.judge, self._named
+        selection, judge = self._selection, self._selection.judge
         samples, first = samples or selection.samples, below.solution.basis if first is None else first
         rows = samples.rows(strokes)
         problem = samples.problem(rows, strokes)
         start = problem.solve(first)
         free = selection.candidate(self.name, problem, start, judge.criterion, rows=rows, strokes=strokes)
-        if named or judge.fall(below, free) > 0.0:
-            free = self._grown(below, free, samples, play)
+        if self._named or judge.fall(below, free) > 0.0:
+            return self._grown(below, free, samples, play)
+        return free
+
+    def _chosen(self, below: Candidate, free: Candidate) -> Candidate:
+        """Returns the better one of the simpler candidate and a network with hysteresis, on which the
+        constraints are imposed."""
+        judge, named = self._selection.judge, self._named
         if not named and not judge.accepts(below, free):
             return judge.better(below, free)
+        self._selection.start_basis[self.name] = free.solution.basis
         kept = self._selection.constrained(free)
         if named:
             self._report_sign(kept, kept, free)
@@ -189,8 +189,7 @@ class Hysteresis(ModelClass):
             rows = samples.rows(strokes)
             limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
             grown = selection.grown(samples.problem(rows, strokes), basis, self.name, limit)
-            basis = selection.start_basis[self.name] = grown.solution.basis
-            reason = grown.stop_reason
+            basis, reason = grown.solution.basis, grown.stop_reason
             found = selection.candidate(
                 self.name, grown.problem, grown.solution, reason, rows=rows, strokes=strokes
             )
