@@ -60,6 +60,13 @@ def lowered(quantity: str, decrease: float) -> str:
     return f"{_verb(decrease)} {quantity} by {_short(decrease)}"
 
 
+def shifted_strokes(timed: bool) -> str:
+    """Returns the causes and cures of strokes that cross where the force is steep, for a recording with or
+    without time: backlash shifts the positions of one stroke, and so does a force that is recorded late."""
+    cure = "try --force-late-s" if timed else "record the time"
+    return f"backlash or a late force shifts the strokes so: mount the object without backlash, or {cure}"
+
+
 def _verb(decrease: float) -> str:
     return "lowers" if decrease >= 0.0 else "raises"
 

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..decision import in_words
+from ..decision import in_words, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import (
     Bound,
@@ -196,7 +196,7 @@ class ClassSelection:
             return note
         late = ""
         if crosses_where_steep(free.problem, free.solution):
-            late = " The force may be recorded late: try --force-late-s."
+            late = f" Perhaps {shifted_strokes(bool(self.data.parts))}."
         return f"{note} Without this constraint {above}; a passive object cannot do that.{late}"
 
     def above_press(self, free: Candidate) -> str:

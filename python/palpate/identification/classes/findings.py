@@ -18,7 +18,7 @@ from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
-from ..decision import latest
+from ..decision import latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
@@ -60,7 +60,9 @@ def verdict_of(
         "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
     )
     cure = ""
-    if not network.findings:
+    if not network.findings and network.nrmse <= USABLE_NRMSE:
+        cure = ". The rows are too far apart to show the force between them: record more rows per stroke"
+    elif not network.findings:
         timed = all(each.time is not None for each in recordings)
         directed = all(each.direction is not None for each in recordings)
         more = _more_inputs(timed, directed)
@@ -171,8 +173,8 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
         )
         if loop < 0.0:
             reason = (
-                f"release is {unit.text(-float(loop))} above press, which the model excludes. If the force "
-                "was recorded late, give --force-late-s; for a latch or a stored spring, "
+                f"release is {unit.text(-float(loop))} above press, which the model excludes; "
+                f"{shifted_strokes(bool(data.parts))}; for a latch or a stored spring, give "
                 "--no-hysteresis-nonnegative"
             )
     return [
@@ -206,7 +208,7 @@ def energy_findings(best: Candidate) -> list[Finding]:
         usable(
             f"at {position} the force of a release is {data.force_unit.text(-float(mean[worst]))} above that "
             "of a press at the same speed; a passive object cannot do that. A stroke has another zero or the "
-            "wrong sign, or the force is late: record again, or try --force-late-s"
+            f"wrong sign, or {shifted_strokes(True)}"
         )
     ]
 

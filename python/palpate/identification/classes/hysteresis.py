@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...recording.motion import noise_band
 from ...verdict import usable
 from ..data.strokes import HysteresisInput, parallel_behind_turns
-from ..decision import Decision
+from ..decision import Decision, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
@@ -26,7 +26,7 @@ from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
 """Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
-above which a finding names a cure [-]."""
+above which a finding names a cure [-]; up to this ratio, the error with h <= 0 shows exchanged strokes."""
 
 FIRST_MAX_WAVELETS = 4
 """Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
@@ -228,15 +228,14 @@ class Hysteresis(ModelClass):
         where = self._selection.above_press(free) or "on a part of the loop"
         cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
         turned = self._turned_rmse(free)
-        if turned < math.sqrt(kept.rmse * free.rmse):
+        if turned <= REPORTED_ERROR_RATIO * free.rmse:
             cure = (
                 f"with the opposite sign of the recorded force the NRMSE is {turned / spread:.3g}. Press and "
                 "release may be exchanged: give --negate force or --negate position"
             )
         elif crosses_where_steep(free.problem, free.solution):
-            cure = (
-                "the release force is above the press force where the force is steep. The force may be "
-                "recorded late: try --force-late-s"
+            cure = "the release force is above the press force where the force is steep; " + shifted_strokes(
+                bool(self._selection.data.parts)
             )
         else:
             cure = (

@@ -206,6 +206,31 @@ def test_release_above_press_at_a_place_is_not_called_another_input() -> None:
     assert "depends on more" not in reason
 
 
+def test_few_rows_are_named_as_the_cause_when_only_rows_left_out_do_not_fit() -> None:
+    x = np.r_[np.linspace(0.0, 3.8, 20), np.linspace(3.6, 0.0, 19)]
+    side = np.repeat([1.0, -1.0], [20, 19])
+    click = np.exp(-(((x - np.where(side > 0.0, 1.6, 1.4)) / 0.1) ** 2))
+    force = 20.0 * (1.0 - np.exp(-x / 0.1)) + 20.0 * click + 1.5 * side + 200.0 * np.maximum(x - 3.5, 0.0)
+    model = palpate.identify(palpate.Recording.from_arrays(x, force, direction=side))
+    (reason,) = (each for each in model.verdict.reasons if "left out" in each)
+    assert model.fit.nrmse < 0.1
+    assert "record more rows per stroke" in reason
+    assert "depends on more" not in reason
+
+
+@pytest.mark.parametrize(("timed", "cure"), [(False, "record the time"), (True, "try --force-late-s")])
+def test_strokes_shifted_by_backlash_are_not_only_called_late(timed: bool, cure: str) -> None:
+    x = np.r_[np.linspace(0.0, 4.0, 800), np.linspace(4.0, 0.0, 800)]
+    side = np.repeat([1.0, -1.0], 800)
+    moved = np.where(side > 0.0, x, x + 0.03)
+    click = np.where(side > 0.0, np.exp(-(((x - 1.8) / 0.15) ** 2)), -np.exp(-(((x - 1.5) / 0.25) ** 2)))
+    force = 30.0 * (1.0 - np.exp(-x / 0.06)) + 15.0 * click + 20000.0 * np.maximum(moved - 3.9, 0.0)
+    time = 0.01 * np.arange(len(x)) if timed else None
+    (reason, *_) = palpate.identify(palpate.Recording.from_arrays(x, force, time, side)).verdict.reasons
+    assert "backlash" in reason
+    assert cure in reason
+
+
 @pytest.mark.full
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data, set PALPATE_DATA")
 @pytest.mark.parametrize("stretch", ["1d5", "2d0", "4d0", "6d0"])
