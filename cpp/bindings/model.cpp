@@ -487,6 +487,10 @@ void bind_model(py::module_& module) {
     type.def_property_readonly(
         "of_velocity", [](const ForceModel& m) { return m.velocity() != nullptr; },
         "True if the model has two inputs, of which the second is the velocity.");
+    type.def_property_readonly(
+        "of_position", [](const ForceModel& m) { return m.velocity() == nullptr && m.memory() == nullptr; },
+        "True if velocity and time do not change the force. Couplings, prediction, admittance displays\n"
+        "and most exports need such a model; all others are rendered directly.");
     type.def_property_readonly("weight_hysteresis", [](const ForceModel& m) -> std::optional<Array> {
         return m.hysteresis() ? std::optional(row(m.hysteresis()->hysteresis_force().parameters().weight))
                               : std::nullopt;

@@ -177,6 +177,12 @@ class ForceModel:
     def n_wavelets(self) -> int:
         ...
     @property
+    def of_position(self) -> bool:
+        """
+        True if velocity and time do not change the force. Couplings, prediction, admittance displays
+        and most exports need such a model; all others are rendered directly.
+        """
+    @property
     def of_velocity(self) -> bool:
         """
         True if the model has two inputs, of which the second is the velocity.

@@ -167,7 +167,7 @@ def modelled(compared: Compared) -> Chart:
 
 def one_curve(model: Model) -> bool:
     """Returns True if position and stroke alone determine the force of a model at rest."""
-    return model.dimension == 1 and model.memory is None
+    return model.dimension == 1 and model.of_position
 
 
 def is_dynamic(model: Model) -> bool:

@@ -203,7 +203,7 @@ def picture_verification(
         if recording.direction is not None
     ]
     all_directed = len(directions) == len(verified)
-    one_curve = (not model.hysteretic or all_directed) and model.memory is None and not model.of_velocity
+    one_curve = model.of_position and (all_directed or not model.hysteretic)
     drawn = Recording.from_arrays(
         np.concatenate([recording.position[verification.rows] for recording, verification in verified]),
         np.concatenate([recording.force[verification.rows] for recording, verification in verified]),
@@ -296,7 +296,7 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
     from ..plotting import draw_measured_and_modelled
 
     modelled = force_at(plan, rendered.position, rendered.sample_period)
-    one_curve = not (plan.model.hysteretic or plan.model.of_velocity or plan.model.memory is not None)
+    one_curve = plan.model.of_position and not plan.model.hysteretic
     title = (
         f"model of {source_name(plan.model.data.files)}, rendered: {plan.structure}\n"
         f"{_error_text(modelled, rendered.force)}"

@@ -176,7 +176,7 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any], device: 
             return replace(plan, certificate=None) if is_other else plan
         if device is not None:
             scheme = {"structure": "direct"}
-        elif not model.of_velocity and model.memory is None:
+        elif model.of_position:
             talk(
                 "the model has no plan: the default coupling makes it softer; "
                 "'palpate plan' finds a rendering without this error"

@@ -41,7 +41,7 @@ class SteepestSlope:
     def of(cls, model: ForceModel) -> SteepestSlope | None:
         """Returns the steepest slope of a model; None if the force depends on more than position and
         direction, or does not rise."""
-        if model.dimension > 1 or model.of_velocity or model.memory is not None:
+        if model.dimension > 1 or not model.of_position:
             return None
         x = np.linspace(float(model.lower[0]), float(model.upper[0]), _POSITIONS)
         sides = (1.0, -1.0) if model.hysteretic else (None,)

@@ -500,7 +500,7 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
     `_LATE_TICK_PERIODS`, or the allowed time without prediction. If direct rendering is certified only with a
     prediction, every certified prediction is allowed.
     """
-    if task.predict is not None or task.model.of_velocity or task.model.memory is not None:
+    if task.predict is not None or not task.model.of_position:
         return found
     enough = min(_LATE_TICK_PERIODS * task.device.longest_period_s, found.certificate.longest_period_s)
     for samples in _PREDICTION_SAMPLES:

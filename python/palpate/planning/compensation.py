@@ -74,7 +74,7 @@ def compensate(
         raise InputError(f"{device.id} is an admittance display: it has no cogging that a hand feels")
     if COMPENSATION_KEY in model.notes:
         raise InputError("the model is a compensation already: give the identified model of the cogging")
-    if model.period is None or model.dimension != 1 or model.memory is not None:
+    if model.period is None or model.dimension != 1 or not model.of_position:
         raise InputError(
             "the model has no period, so it is not the cogging of a motor: identify it with --period 360deg"
         )

@@ -172,7 +172,7 @@ class Plan:
         """Smallest tried share of the identified force with which a resting finger oscillates in simulation,
         in words."""
         text = "no structure is proved stable on this device"
-        if self.certificate is None or self.model.of_velocity or self.model.memory is not None:
+        if self.certificate is None or not self.model.of_position:
             return text
         device, unit = self.certificate.device, self._units()["position"]
         direct = Scheme(structure="direct", play_radius=default_play_radius(self.model, device.encoder_step))

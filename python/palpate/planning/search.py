@@ -155,8 +155,7 @@ def plan(
         raise InputError(
             "the model has a memory: it can only be rendered directly, without coupling, mass and damping"
         )
-    direct_only = model.of_velocity or model.memory is not None
-    if samples and (direct_only or task.coupling or task.dynamic):
+    if samples and (not model.of_position or task.coupling or task.dynamic):
         raise InputError(
             f"predict is {samples}: must be 0 (off) with a coupling, mass, damping, velocity input or "
             "memory; a prediction is certified only for direct rendering of a force of position"
@@ -189,7 +188,7 @@ def _on_admittance_display(
     accept_force_error: float,
 ) -> Plan:
     """Returns the plan with the least object damping on an admittance display."""
-    if model.of_velocity or model.memory is not None:
+    if not model.of_position:
         raise InputError(
             f"{device.id} is an admittance display: it renders a force of position alone, without velocity "
             "input or memory"

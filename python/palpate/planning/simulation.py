@@ -373,7 +373,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     (n,) array
         Force [N*m or N].
     """
-    if period_s is None and (plan.model.of_velocity or plan.model.memory is not None):
+    if period_s is None and not plan.model.of_position:
         raise InputError(
             "period_s is None: must be given for a force that depends on velocity or has a memory"
         )
