@@ -71,8 +71,14 @@ struct Reports {
 namespace detail {
 
 /// Limits that keep the memory of a wrong descriptor small.
-inline constexpr std::size_t most_report_bits = 8 * 4096;
+inline constexpr std::size_t most_report_bits = 32768;
 inline constexpr std::size_t most_usages = 4096;
+
+/// Returns the signed number in the lowest `bits` bits, 1 to 63, of a code without other bits.
+[[nodiscard]] constexpr std::int64_t signed_number(std::uint64_t code, std::size_t bits) noexcept {
+    const std::uint64_t sign = std::uint64_t{1} << (bits - 1U);
+    return static_cast<std::int64_t>((code ^ sign) - sign);
+}
 
 /// Global and local items of a descriptor up to the next main item.
 struct Items {
@@ -97,8 +103,8 @@ struct Items {
     detail::Items items;
     std::vector<detail::Items> pushed;
     std::vector<std::uint32_t> usages, inside;
-    std::uint32_t first_usage = 0;              // 0: not stated
-    std::vector<std::size_t> used(3 * 256, 0);  // bits of each report so far
+    std::uint32_t first_usage = 0;                           // 0: not stated
+    std::vector<std::size_t> used(std::size_t{3} * 256, 0);  // bits of each report so far
     const auto end_local = [&] {
         usages.clear();
         first_usage = 0;
@@ -122,9 +128,7 @@ struct Items {
             data |= static_cast<std::uint32_t>(bytes[at + k]) << 8U * k;
         }
         at += size;
-        const auto shift = static_cast<unsigned>(32 - 8 * size);
-        const std::int64_t number =
-            size == 0 ? 0 : static_cast<std::int32_t>(data << shift) >> static_cast<int>(shift);
+        const std::int64_t number = size == 0 ? 0 : detail::signed_number(data, 8 * size);
         const std::uint32_t with_page = size == 4 ? data : hid::usage_of(items.page, data);
         switch (head & 0xFCU) {
             case 0x80:    // input
@@ -149,8 +153,10 @@ struct Items {
                 field.exponent = items.exponent;
                 field.minimum = items.minimum;
                 // A maximum below the minimum is an unsigned number that its sign bit makes negative
-                const std::int64_t wrap = std::int64_t{1} << std::min<std::size_t>(items.bits, 32);
-                field.maximum = items.maximum < items.minimum ? items.maximum + wrap : items.maximum;
+                const std::uint64_t wrap = std::uint64_t{1} << std::min<std::size_t>(items.bits, 32);
+                field.maximum = items.maximum < items.minimum
+                                    ? items.maximum + static_cast<std::int64_t>(wrap)
+                                    : items.maximum;
                 field.usages = usages;
                 field.inside = inside;
                 bits += items.bits * items.count;
@@ -269,23 +275,21 @@ struct Value {
         for (std::size_t k = 0; k < bits; ++k) {
             const std::size_t bit = first_bit + k;
             if (bit / 8 < content.size()) {
-                code |= static_cast<std::uint64_t>(content[bit / 8] >> bit % 8 & 1U) << k;
+                const std::uint64_t byte = content[bit / 8];
+                code |= (byte >> bit % 8 & 1U) << k;
             }
         }
-        const std::uint64_t sign = std::uint64_t{1} << (bits - 1);
-        return minimum < 0 && (code & sign) != 0
-                   ? static_cast<std::int64_t>(code) - static_cast<std::int64_t>(sign << 1U)
-                   : static_cast<std::int64_t>(code);
+        return minimum < 0 && bits > 0 ? detail::signed_number(code, bits) : static_cast<std::int64_t>(code);
     }
     /// Writes the value into the content of a report.
     void write(std::span<std::uint8_t> content, std::int64_t code) const noexcept {
         for (std::size_t k = 0; k < bits; ++k) {
             const std::size_t bit = first_bit + k;
             if (bit / 8 < content.size()) {
-                const auto mask = static_cast<std::uint8_t>(1U << bit % 8);
+                const unsigned mask = 1U << bit % 8;
                 const bool is_set = (static_cast<std::uint64_t>(code) >> k & 1U) != 0;
-                content[bit / 8] =
-                    static_cast<std::uint8_t>(is_set ? content[bit / 8] | mask : content[bit / 8] & ~mask);
+                const unsigned byte = content[bit / 8];
+                content[bit / 8] = static_cast<std::uint8_t>(is_set ? byte | mask : byte & ~mask);
             }
         }
     }

@@ -21,7 +21,7 @@ namespace palpate::hid::pid {
 inline constexpr std::uint32_t page = 0x0F;
 
 /// Usages of the page 0x0F.
-enum Usage : std::uint32_t {
+enum Usage : std::uint8_t {
     SetEffect = 0x21,
     BlockIndex = 0x22,
     ParameterOffset = 0x23,
