@@ -37,7 +37,7 @@ for source in bench/solvers/bench_*.cpp bench/admittance/bench_admittance.cpp; d
 done
 "build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 63 * scale) }')" |
     tee build/bench/certificate_search.txt
-build/release/bench/cogging_search "$(awk -v scale="$scale" 'BEGIN { print int(10000 * scale) }')" |
+build/release/bench/cogging_search "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 30 : 10000 * scale }')" |
     tee build/bench/cogging_search.txt
 
 # Runs the studies of its input, one a line. A short run only tests them, two at a time; times are measured alone.
