@@ -18,7 +18,7 @@
 /// 0x0F. The report descriptor of the device states the place of each value.
 namespace palpate::hid::pid {
 
-inline constexpr std::uint32_t page = 0x0F;
+inline constexpr std::uint32_t page = 0x0F;  ///< usage page of the class
 
 /// Usages of the page 0x0F.
 enum Usage : std::uint8_t {
@@ -85,6 +85,7 @@ template <class Byte>
 [[nodiscard]] std::span<Byte> content(std::span<Byte> report) noexcept {
     return report.empty() ? report : report.subspan(1);
 }
+/// Writes a code at the place of a value; without a place it does nothing.
 inline void write(Bytes& report, const Value& value, std::int64_t code) noexcept {
     value.write(content(std::span{report}), code);
 }
