@@ -64,7 +64,7 @@ nitpick_ignore_regex = [
     (r"py:.*", r"(?!palpate\.)\S.*"),
     # Types of signatures in a module of a package; only names that a package exports have pages.
     (r"py:.*", r"palpate\.(_\w+|\w+\.\w+)\..*"),
-    (r"cpp:.*", r"(?!palpate::).*|palpate::(wire|mit|moteus|detail)\b.*"),
+    (r"cpp:.*", r"(?!palpate::).*|palpate::(wire|mit|moteus|hid|detail)\b.*"),
 ]
 autosummary_ignore_module_all = False
 # Members of the base classes of scikit-learn and Python are described in their documentation.

@@ -37,6 +37,8 @@ for source in bench/solvers/bench_*.cpp bench/admittance/bench_admittance.cpp; d
 done
 "build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 63 * scale) }')" |
     tee build/bench/certificate_search.txt
+build/release/bench/cogging_search "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 30 : 10000 * scale }')" |
+    tee build/bench/cogging_search.txt
 
 # Runs the studies of its input, one a line. A short run only tests them, two at a time; times are measured alone.
 at_once=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 1 }')
@@ -63,6 +65,7 @@ limits/prediction.py --to $to
 rivals/rivals.py --to $to
 plans/on_device_stiffness.py --to $to
 plans/held_lines.py --to $to $([ "$at_once" -gt 1 ] && echo --devices 1)
+plans/held_objects.py --to $to $([ "$at_once" -gt 1 ] && echo --every 1000)
 admittance/admittance.py --to $to
 portable/cost.py --to $to --json build/bench/portable_cost.json
 plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')

@@ -72,9 +72,10 @@ class Curve:
 
 
 def devices() -> list[DeviceProfile]:
-    """Returns the example devices whose controller holds lines, stated or assumed."""
+    """Returns the example devices whose controller holds lines, stated or assumed, except wheels, which carry
+    no key."""
     profiles = [DeviceProfile.load(file) for file, _ in example_profiles().values()]
-    found = [each for each in profiles if each.held_line is not None]
+    found = [each for each in profiles if each.held_line and each.held_line.largest_center is None]
     coil = DeviceProfile.load(example_profiles()["voice-coil"][0])
     return [*found, DeviceProfile(**coil.to_dict() | {"held_line": SLIDE_LOOP})]
 

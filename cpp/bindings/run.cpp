@@ -148,7 +148,10 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
     const PlannedModel planned{model_name, model,   position_unit, force_unit,
                                plan,       limited, certificate,   findings};
-    const auto device = open_device(options, planned);
+    const auto device = [&] {
+        const py::gil_scoped_release unlocked;  // a device may answer slowly
+        return open_device(options, planned);
+    }();
     RecordSinks sinks;
     const RenderJob job = prepare_rendering(options, planned, *device, sinks);
     Watcher watcher{progress,
@@ -170,7 +173,10 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
     MeasureOptions options;
     set_options(options, given);
     options.units = record_units(position_unit, force_unit);
-    const auto device = device_to_measure(options, object);
+    const auto device = [&] {
+        const py::gil_scoped_release unlocked;
+        return device_to_measure(options, object);
+    }();
     Watcher watcher{progress, &LoopProgress::object_force};
     const auto summary = [&] {
         const py::gil_scoped_release unlocked;

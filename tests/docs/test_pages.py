@@ -29,7 +29,7 @@ NOT_RUN = {
     "docs/how-to/cluster.md": 1,  # a cluster
     "docs/how-to/firmware.md": 2,  # a device
     "docs/how-to/pedal.md": 2,  # real time, a part of a program
-    "docs/how-to/motor.md": 2,  # CAN hardware
+    "docs/how-to/motor.md": 3,  # CAN hardware, a wheel
     "docs/how-to/real-time.md": 3,  # system administration, a quiet computer
     "docs/how-to/simulator.md": 4,  # MuJoCo, FMPy
     "docs/identification.md": 1,  # an hour

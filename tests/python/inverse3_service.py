@@ -37,6 +37,9 @@ class Service:
     device_id: str = "049D"
     calibrated: bool = True
     force_key: str = "vector"
+    force_gate: float = 0.3
+    added_damping: float = 0.5
+    """Settings by which the service changes forces"""
     mass: float = 0.2
     damping: float = 2.0
     hand_stiffness: float = 200.0
@@ -133,7 +136,10 @@ class Service:
             device["config"] = {
                 "type": "inverse3",
                 "device_info": {"major_version": 7, "minor_version": 4, "id": "049D"},
-                "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.5}},
+                "filters": {
+                    "force_gate": {"gain": self.force_gate},
+                    "damping": {"scalar": self.added_damping},
+                },
             }
         return {"inverse3": [] if unplugged else [device] * self.devices}
 

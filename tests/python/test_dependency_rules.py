@@ -58,11 +58,13 @@ OPTIONAL_HEADERS = {
     "device/detail/usb_connection.hpp",
     "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",
+    "device/hid_node.hpp",
     "device/inverse3.hpp",
     "device/inverse3_messages.hpp",
     "device/mit_device.hpp",
     "device/moteus_device.hpp",
     "device/usb.hpp",
+    "device/wheel_device.hpp",
     "io/detail/model_file.hpp",
     "io/detail/plan_file.hpp",
     "io/json_field.hpp",
@@ -74,15 +76,16 @@ OPTIONAL_HEADERS = {
     "run/open_can.hpp",
     "run/open_inverse3.hpp",
     "run/open_usb.hpp",
+    "run/open_wheel.hpp",
     "simulation/detail/open_device.hpp",
     "simulation/open_device.hpp",
 }
 
 # System headers that a folder may use besides the standard library: the clock, the scheduler, memory and
-# latency in realtime; files and sockets in io; the CAN bus in device.
+# latency in realtime; files and sockets in io; the CAN bus and hidraw in device.
 SYSTEM_HEADERS = {
     "device": {"linux/can.h", "linux/can/error.h", "linux/can/raw.h", "net/if.h", "poll.h", "sys/socket.h"}
-    | {"sys/un.h", "unistd.h"},
+    | {"fcntl.h", "linux/hidraw.h", "sys/file.h", "sys/ioctl.h", "sys/stat.h", "sys/un.h", "unistd.h"},
     "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
     | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/file.h", "sys/socket.h", "sys/stat.h", "unistd.h"},

@@ -6,6 +6,7 @@
 #include "palpate/device/mit_wire.hpp"
 #include "palpate/device/moteus_wire.hpp"
 #include "palpate/device/packet_stream.hpp"
+#include "palpate/device/pid_reports.hpp"
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/fields/escaped.hpp"
 #include "palpate/portable/export_check.hpp"

@@ -134,7 +134,7 @@ class HeldLine:
     def __hash__(self) -> int:
         ...
     @typing.overload
-    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, delay_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, stiffness_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, limits_force: bool = True, watchdog_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, delay_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, stiffness_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, limits_force: bool = True, watchdog_s: typing.SupportsFloat | typing.SupportsIndex | None = None, largest_center: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         ...
     @typing.overload
     def __init__(self, fields: dict) -> None:
@@ -156,6 +156,11 @@ class HeldLine:
     def encoder_step(self) -> float:
         """
         Smallest change of position that the controller reads [m or rad]; 0 = not quantised.
+        """
+    @property
+    def largest_center(self) -> float | None:
+        """
+        Largest distance from 0 of the position at which a line has zero force, for a controller that takes a spring about a center, such as a wheel [m or rad]; absent: a command states force and position.
         """
     @property
     def largest_stiffness(self) -> float | None:

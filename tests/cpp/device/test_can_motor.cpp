@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "emulated_can_motor.hpp"
+#include "palpate/device/wheel_device.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/run/transports.hpp"
@@ -422,9 +423,13 @@ TEST(Transports, StateTheWaitsOfTheDevices) {
             EXPECT_EQ(transport.wait_s, 1e-9 * static_cast<double>(MitSettings{}.wait));
         } else if (transport.name == "moteus") {
             EXPECT_EQ(transport.wait_s, 1e-9 * static_cast<double>(MoteusSettings{}.wait));
+        } else if (transport.name == "wheel") {
+            EXPECT_EQ(transport.wait_s, 1e-9 * static_cast<double>(WheelSettings{}.wait));
         }
     }
-    EXPECT_EQ(transport_forms(true), "simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND or moteus:BUS:NUMBER:KP");
+    EXPECT_EQ(transport_forms(true),
+              "simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND, moteus:BUS:NUMBER:KP or "
+              "wheel:NODE:DEGREES:TORQUE[:STIFFNESS]");
 }
 
 }  // namespace

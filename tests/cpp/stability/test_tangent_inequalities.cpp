@@ -153,6 +153,27 @@ TEST(TangentCertificate, RefusesWhatNoProofCovers) {
     EXPECT_NE(reason_of(wall, steepest, motor()).find("every inequality is proved"), std::string::npos);
 }
 
+TEST(TangentCertificate, OfAControllerThatTakesSpringsHasAConstantSlopeAndPaysForTheStepOfTheCenter) {
+    const ForceBounds wall = wall_bounds(20.0, 0.01);
+    DeviceProfile device = motor(1e-3);
+    device.viscous_damping = 0.02;
+    device.coulomb_friction = 0.02;
+    device.held_line->position_step = 4e-4;
+    const HeldSlope constant{SlopeRule::Constant, 15.0, 0.0, std::nullopt};
+    const double lines = line_of(certify(wall, tangent(constant), device), "friction-line").right;
+    device.held_line->largest_center = 1.5;
+    EXPECT_NEAR(line_of(certify(wall, tangent(constant), device), "friction-line").right - lines,
+                0.5 * 4e-4 * 15.0, 1e-12);
+    EXPECT_TRUE(certify(wall, tangent(constant), device).certified());
+    for (const SlopeRule rule : {SlopeRule::Raised, SlopeRule::Steepest}) {
+        EXPECT_NE(reason_of(wall, {rule, 20.0, 0.0, 3e-3}, device).find("use the rule constant"),
+                  std::string::npos);
+    }
+    EXPECT_EQ(line_for(wall, device, 3e-3).rule, SlopeRule::Constant);
+    device.delay_s = 0.0;
+    EXPECT_EQ(line_for(wall, device, 3e-3).rule, SlopeRule::Constant);
+}
+
 TEST(TangentCertificate, RefusesAControllerWithTooSmallNumbers) {
     const ForceBounds wall = wall_bounds(20.0, 0.01);
     const HeldSlope line{SlopeRule::Steepest, 20.0, 0.0, 3e-3};

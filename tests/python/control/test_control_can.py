@@ -188,7 +188,10 @@ def test_the_watchdog_ends_the_torque_of_a_killed_program(drive: Drive, bus: Pat
             "mit:/nowhere/bus:1:damiao-4310",
             "/nowhere/bus: No such file or directory; start the emulated",
         ),
-        ("mitten", "must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND, moteus:BUS:NUMBER:KP or inverse3"),
+        (
+            "mitten",
+            "mit:BUS:NUMBER:KIND, moteus:BUS:NUMBER:KP, wheel:NODE:DEGREES:TORQUE[:STIFFNESS] or inverse3",
+        ),
         (
             "moteus:can0:1",
             "must be moteus:BUS:NUMBER:KP, such as moteus:can0:1:4; KP is servo.",
@@ -236,4 +239,4 @@ def test_the_help_names_every_transport() -> None:
         assert text in shown
         assert form in device_help
         assert (form in measured_device_help) == (name != "inverse3")
-    assert re.search(r"usb 5, mit 2, moteus 2, inverse3 20", shown)
+    assert re.search(r"usb 5, mit 2, moteus 2, wheel 1, inverse3 20", shown)

@@ -177,12 +177,25 @@ def certified(folder: Path, spring: Path, delay_s: float) -> Path:
 def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, tmp_path: Path) -> None:
     # The service answers within the period, but the loop sends the force of a state one period after it.
     model = certified(tmp_path, spring, delay_s=0.5e-3)
-    with serving(Service()) as service:
+    with serving(Service(force_gate=0.0, added_damping=0.0)) as service:
         completed = control(model, "--device", f"inverse3:z@{service.port}", env=service.environment)
     assert completed.returncode == 1
     assert "stopped because the device applied a force" in completed.stderr
     assert "the certificate holds for at most 0.5 ms; plan with a larger delay_s" in completed.stderr
     assert service.forces[-1]["z"] == 0.0
+
+
+@pytest.mark.parametrize("settings", [{"force_gate": 0.0}, {"added_damping": 0.0}])
+def test_a_certified_run_is_refused_if_the_service_changes_forces(
+    settings: dict[str, float], spring: Path, tmp_path: Path
+) -> None:
+    model = certified(tmp_path, spring, delay_s=2e-3)
+    with serving(Service(**settings)) as service:  # type: ignore[arg-type]
+        completed = control(model, "--device", f"inverse3:z@{service.port}", env=service.environment)
+    assert completed.returncode == 2
+    assert "the Inverse Service changes forces (force gate" in completed.stderr
+    assert "set both to 0 in its settings, or set uncertified" in completed.stderr
+    assert all(force["z"] == 0.0 for force in service.forces)
 
 
 def largest_delay(service: Service, last: int) -> int:
@@ -210,7 +223,7 @@ def test_random_faults_of_the_service_make_no_force_older_than_certified(
     ends = Counter[str]()
     ticks = 0
     for run in range(60 * SCALE):
-        service = Service(mass=0.02, sweep=0.02)
+        service = Service(mass=0.02, sweep=0.02, force_gate=0.0, added_damping=0.0)
         first = int(generator.integers(FIRST_FAULT, 480))
         for number in range(first, first + int(generator.integers(1, 4))):
             kind, length = generator.choice(["late", "lost", "burst", "extra"]), int(generator.integers(1, 8))

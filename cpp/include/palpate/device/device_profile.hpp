@@ -125,6 +125,7 @@ struct HeldLine {
     std::optional<double> largest_stiffness = std::nullopt;
     bool limits_force = true;
     std::optional<double> watchdog_s = std::nullopt;
+    std::optional<double> largest_center = std::nullopt;
 
     [[nodiscard]] bool operator==(const HeldLine&) const = default;
 };
@@ -156,6 +157,11 @@ inline constexpr auto fields_of<HeldLine> = std::tuple{
     Field<&HeldLine::watchdog_s>{
         "watchdog_s",
         "Time after the last command at which the controller makes zero force [s]; absent: never.",
+        Rule::Positive},
+    Field<&HeldLine::largest_center>{
+        "largest_center",
+        "Largest distance from 0 of the position at which a line has zero force, for a controller that takes "
+        "a spring about a center, such as a wheel [m or rad]; absent: a command states force and position.",
         Rule::Positive}};
 
 /// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob

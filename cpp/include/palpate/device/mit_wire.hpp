@@ -40,6 +40,8 @@ struct Preset {
 
 /// Drives by name. Sources: Damiao, the table of PyPI damiao-motor 1.0.6; CubeMars, from memory, not
 /// checked against the manual of the AK series; RobStride, the table of PyPI robstride-dynamics 0.0.1. No number was tried on hardware.
+/// No MIT frame of CubeMars (manual of the AK series 1.0.8) or RobStride sets a watchdog; RobStride's parameter 0x7028
+/// canTimeout belongs to its private protocol.
 inline constexpr std::array presets{
     Preset{"damiao-4310", Maker::Damiao, {12.5, 30.0, 10.0, 500.0, 5.0}},
     Preset{"damiao-4340", Maker::Damiao, {12.5, 10.0, 28.0, 500.0, 5.0}},

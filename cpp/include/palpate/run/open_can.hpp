@@ -18,21 +18,15 @@
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"
+#include "palpate/run/transports.hpp"
 
 namespace palpate {
 
 namespace detail {
 
-/// Returns the parts of a device name, which colons separate. Throws std::invalid_argument with the valid form.
+/// Returns the parts of the name of a device on a CAN bus. Throws std::invalid_argument with the valid form.
 [[nodiscard]] inline std::vector<std::string> can_parts(const std::string& device, const std::string& form) {
-    std::vector<std::string> parts{""};
-    for (const char letter : device) {
-        if (letter == ':') {
-            parts.emplace_back();
-        } else {
-            parts.back() += letter;
-        }
-    }
+    std::vector<std::string> parts = device_parts(device);
     if (parts.size() != 4 || parts[1].empty()) {
         refuse("device is '" + device + "', must be " + form);
     }
@@ -86,11 +80,7 @@ template <class Settings>
         "moteus:BUS:NUMBER:KP, such as moteus:can0:1:4; KP is servo.pid_position.kp of the controller");
     settings.interface = parts[1];
     settings.number = can_number(options.device, parts[2], 126);
-    const char* end = parts[3].data() + parts[3].size();
-    const auto found = std::from_chars(parts[3].data(), end, settings.kp);
-    if (found.ec != std::errc{} || found.ptr != end || !(settings.kp > 0.0 && std::isfinite(settings.kp))) {
-        refuse("device is '" + options.device + "', KP must be a number > 0 in N*m/rev");
-    }
+    settings.kp = positive_part(options.device, parts[3], "KP", "N*m/rev");
     return with_run_options(std::move(settings), options);
 }
 

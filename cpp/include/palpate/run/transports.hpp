@@ -2,8 +2,13 @@
 #pragma once
 
 #include <array>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
 #include "palpate/fields/readable.hpp"
 
@@ -33,9 +38,40 @@ inline constexpr std::array transports{
               true, 2e-3},
     Transport{"moteus", "moteus:BUS:NUMBER:KP", "a moteus whose servo.pid_position.kp is KP in N*m/rev", true,
               2e-3},
+    Transport{
+        "wheel", "wheel:NODE:DEGREES:TORQUE[:STIFFNESS]",
+        "a force-feedback wheel (USB class PID) on a NODE such as /dev/hidraw0: DEGREES from end to end, "
+        "TORQUE in N*m of its full force, STIFFNESS in N*m/rad of its full spring",
+        true, 1e-3},
     Transport{"inverse3", "inverse3[:AXIS[@PORT]]", "AXIS is x, y, z, -x, -y or -z, PORT that of its service",
               false, 20e-3},
 };
+
+/// Returns the parts of the name of a device, which colons separate.
+[[nodiscard]] inline std::vector<std::string> device_parts(const std::string& device) {
+    std::vector<std::string> parts{""};
+    for (const char letter : device) {
+        if (letter == ':') {
+            parts.emplace_back();
+        } else {
+            parts.back() += letter;
+        }
+    }
+    return parts;
+}
+
+/// Returns the number in a part of the name of a device. Throws std::invalid_argument unless it is > 0.
+[[nodiscard]] inline double positive_part(const std::string& device, const std::string& part,
+                                          const std::string& name, const std::string& unit) {
+    double number = 0.0;
+    const char* end = part.data() + part.size();
+    const auto found = std::from_chars(part.data(), end, number);
+    if (found.ec != std::errc{} || found.ptr != end || !(number > 0.0 && std::isfinite(number))) {
+        throw std::invalid_argument("device is '" + device + "', " + name + " must be a number > 0 in " +
+                                    unit);
+    }
+    return number;
+}
 
 /// Returns the forms of all devices as text: "simulated, usb[:SERIAL] or ...". `measuring`: only those that measure.
 [[nodiscard]] inline std::string transport_forms(bool measuring) {

@@ -124,6 +124,10 @@ class SimulatedHandle {
         }
         const HeldLine& loop = *profile_.held_line;
         const double stiffness = rounded(command.stiffness, loop.stiffness_step);
+        if (loop.largest_center && stiffness > 0.0) {
+            const double center = rounded(command.position - command.force / stiffness, loop.position_step);
+            return {0.0, std::clamp(center, -*loop.largest_center, *loop.largest_center), stiffness};
+        }
         const double position = rounded(command.position, loop.position_step);
         // The force is that of the line at the rounded position, so rounding the position does not move the line
         return {rounded(command.force + stiffness * (position - command.position), profile_.force_step),

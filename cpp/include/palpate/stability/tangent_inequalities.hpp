@@ -138,6 +138,10 @@ struct LineNeed {
         refuse("line-limit", "force limit outside the loop that holds the line",
                "proved only for 0 such limits", 1.0, "let the controller limit the force of the line");
     }
+    if (device.held_line && device.held_line->largest_center && line.rule != SlopeRule::Constant) {
+        refuse("line-spring", "slope that changes with the position, for a controller that takes springs",
+               "proved only for 0 such slopes", 1.0, "use the rule constant");
+    }
     if (line.rule == SlopeRule::Steepest && device.delay_s > 0.0) {
         refuse("line-delay", "line of the rule steepest, with a delay [s]", "proved only for t_d = 0",
                device.delay_s, "use the rule raised or constant");
@@ -174,8 +178,10 @@ struct LineNeed {
         {"damping-line", "viscous damping against the held line", need.formula, device.viscous_damping,
          detail::inner_need(loop, stiffness) + T * (need.outer + detail::either_need(device, rounded)),
          Basis::Proved, "docs/certificate.md"});
+    // The force of a command compensates the rounding of its position; the center of a spring has no force to do so
+    const double center_step = loop.largest_center ? loop.position_step : 0.0;
     const double errors = detail::product(0.5 * device.encoder_step, need.residual + rounded) +
-                          0.5 * loop.encoder_step * stiffness;
+                          0.5 * (loop.encoder_step + center_step) * stiffness;
     lines.push_back({"friction-line", "Coulomb friction against encoder and force steps",
                      "f_c >= (f' - kappa) Delta / 2 + kappa Delta_in / 2 + Delta_F / 2" +
                          std::string(bounds.mean_force > 0.0 ? " + |mean c(f)|" : ""),
@@ -253,10 +259,14 @@ namespace detail {
 /// Returns the line of the simplest rule that is certified for a force with these bounds on a device, for motions up to
 /// w = `motion` in a period; if none is certified, the line that needs least. Without delay this is `Steepest`. With a
 /// delay the rules are tried in this order: the slope of the force, without a largest motion; `Raised` with the best
-/// lift; `Constant` with the best slope, for every motion.
+/// lift; `Constant` with the best slope, for every motion. A controller that takes springs gets a constant slope: the
+/// center of the spring then contains the force, so one report states the line.
 [[nodiscard]] inline HeldSlope line_for(const ForceBounds& bounds, const DeviceProfile& device,
                                         double motion) {
     const double M = bounds.rising();
+    if (device.held_line && device.held_line->largest_center) {
+        return detail::best_constant(bounds, device);
+    }
     if (device.delay_s == 0.0) {
         const double highest = device.held_line ? device.held_line->largest_stiffness.value_or(M) -
                                                       device.held_line->stiffness_step

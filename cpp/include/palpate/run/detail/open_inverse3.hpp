@@ -48,11 +48,17 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& op
     }
     const Inverse3Info& info = live->device().info();
     const std::string filters = live->report().lines.front().second;
+    // A certificate holds for the force that is sent; the service changes it by these settings
+    const bool certified = !options.uncertified && model.certificate;
+    if (certified && (info.force_gate != 0.0 || info.damping != 0.0)) {
+        refuse("device " + options.device + ": the Inverse Service changes forces (" + filters +
+               "): set both to 0 in its settings, or set uncertified");
+    }
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
     // The service does not send inertia, damping and friction of the device. The profile of the certificate is used;
     // without a certificate, or with `uncertified`, damping and friction are 0.
-    if (!options.uncertified && model.certificate) {
+    if (certified) {
         live->profile = model.certificate->device;
     } else {
         live->profile = unmeasured(scaled_knob(live->scale, false, period_s));

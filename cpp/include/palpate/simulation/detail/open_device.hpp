@@ -18,6 +18,7 @@
 #include "palpate/run/open_can.hpp"
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/open_usb.hpp"
+#include "palpate/run/open_wheel.hpp"
 #include "palpate/run/render.hpp"
 #include "palpate/run/transports.hpp"
 #include "palpate/simulation/faulty_device.hpp"
@@ -92,6 +93,7 @@ inline constexpr std::array<TransportFunctions, transports.size()> transport_fun
     {open_usb, usb_to_measure},
     {open_can<MitProtocol>, can_to_measure<MitProtocol>},
     {open_can<MoteusProtocol>, can_to_measure<MoteusProtocol>},
+    {open_wheel, wheel_to_measure},
     {open_inverse3, nullptr},
 }};
 
