@@ -26,6 +26,21 @@ def count(full: int) -> int:
     return max(1, round(full * min(SCALE, 1.0)))
 
 
+def program(name: str) -> Path:
+    """Returns the path of a program of the studies: optimized, or for a short run that of the C++ tests.
+
+    Raises
+    ------
+    SystemExit
+        The program is missing; the message names the command that builds it.
+    """
+    preset = "release" if SCALE >= 0.1 else "dev"
+    path = ROOT / "build" / preset / "bench" / name
+    if not path.exists():
+        raise SystemExit(f"{path} does not exist: cmake --build --preset {preset} --target {name}")
+    return path
+
+
 def measured_data() -> Path | None:
     """Returns the folder of measured recordings; without one, prints that the study is skipped."""
     folder = Path(os.environ.get("PALPATE_DATA", ""))

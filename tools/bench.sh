@@ -8,23 +8,26 @@ to=${1:-build/bench}
 
 scale=${PALPATE_BENCH_SCALE:-1}
 seconds=$(awk -v scale="$scale" 'BEGIN { print 0.1 * scale }')
-repetitions=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 1 : 5 }')
-blocks=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 1 : 10 }')
+# A short run only tests the studies. Its programs are those of the C++ tests, which compile in half the time.
+is_short=$(awk -v scale="$scale" 'BEGIN { print (scale < 0.1) }')
+full_or_short() { if [ "$is_short" = 1 ]; then echo "$2"; else echo "$1"; fi; }
+preset=$(full_or_short release dev)
+programs=build/$preset/bench
 governor=$(cat /sys/devices/system/cpu/cpu0/cpufreq/scaling_governor 2>/dev/null || echo unknown)
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 
-cmake --preset release >/dev/null
-cmake --build --preset release --target benchmarks
+cmake --preset "$preset" >/dev/null
+cmake --build --preset "$preset" --target benchmarks
 mkdir -p build/bench
 
 processor=$(awk -F': ' '/^model name/ { print $2; exit }' /proc/cpuinfo 2>/dev/null || uname -m)
-compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
-flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
+compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' "build/$preset/CMakeCache.txt")
+flags=$(awk -F= "/^CMAKE_CXX_FLAGS_$(full_or_short RELEASE DEBUG):/ { print \$2 }" "build/$preset/CMakeCache.txt")
 
 for source in bench/solvers/bench_*.cpp bench/admittance/bench_admittance.cpp; do
     name=$(basename "$source" .cpp)
-    "build/release/bench/$name" \
-        --benchmark_min_time="$seconds" --benchmark_repetitions="$repetitions" \
+    "$programs/$name" \
+        --benchmark_min_time="$seconds" --benchmark_repetitions="$(full_or_short 5 1)" \
         --benchmark_enable_random_interleaving=true --benchmark_display_aggregates_only=true \
         --benchmark_out="build/bench/$name.json" --benchmark_out_format=json \
         --benchmark_context=commit="$commit" --benchmark_context=governor="$governor" \
@@ -35,13 +38,12 @@ for source in bench/solvers/bench_*.cpp bench/admittance/bench_admittance.cpp; d
         exit 1
     fi
 done
-"build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 63 * scale) }')" |
+"$programs/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(1 + 64 * scale) }')" |
     tee build/bench/certificate_search.txt
 
-# Runs the studies of its input, one a line. A short run only tests them, two at a time; times are measured alone.
-at_once=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 1 }')
-if [ "$at_once" -gt 1 ]; then export OPENBLAS_NUM_THREADS=1; fi # as for the tests
-studies() { xargs -P "$at_once" -I STUDY bash -c 'echo; .venv/bin/python bench/STUDY'; }
+# Runs the studies of its input, one a line. A short run runs two at a time; times are measured alone.
+if [ "$is_short" = 1 ]; then export OPENBLAS_NUM_THREADS=1; fi # as for the tests
+studies() { xargs -P "$(full_or_short 1 2)" -I STUDY bash -c 'echo; .venv/bin/python bench/STUDY'; }
 studies <<END
 solvers/python_calls.py build/bench/bench_python_calls.json
 solvers/model_error.py build/bench/bench_model_error.json
@@ -56,16 +58,16 @@ identification/dynamic.py --json build/bench/dynamic.json
 identification/repeats.py --json build/bench/repeats.json
 identification/memory.py
 identification/ordinary.py --jobs 1 --json build/bench/ordinary.json
-identification/invariances.py --jobs 1 --json build/bench/invariances.json
+identification/invariances.py $(full_or_short "" "half_the_rate repeated_rows --draws 1") --jobs 1 --json build/bench/invariances.json
 limits/certificate_table.py build/bench/certificate_search.txt --to $to
-limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
+limits/failure_maps.py --to $to --points $(full_or_short 9 2)
 limits/prediction.py --to $to
 rivals/rivals.py --to $to
 plans/on_device_stiffness.py --to $to
-plans/held_lines.py --to $to $([ "$at_once" -gt 1 ] && echo --devices 1)
+plans/held_lines.py --to $to $(full_or_short "" "--devices 1")
 admittance/admittance.py --to $to
 portable/cost.py --to $to --json build/bench/portable_cost.json
-plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')
+plans/plan_against_trial.py --to $to --grid $(full_or_short 4 0)
 END
 # These draw the results of the others.
 studies <<END
@@ -78,7 +80,7 @@ echo "Results: build/bench/*.json; compare two runs with compare.py of Google Be
 echo "Lateness of the real-time loop compared with cyclictest"
 if command -v cyclictest >/dev/null; then
     .venv/bin/python tools/lateness.py build/control/palpate-control tests/models/good/position.json \
-        build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')" --blocks "$blocks"
+        build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')" --blocks "$(full_or_short 10 1)"
 else
     echo "skipped: needs cyclictest (Debian: rt-tests)"
 fi

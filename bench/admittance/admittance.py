@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from bench import studies
 from bench.limits.failure_maps import draw_map, map_table
 from bench.solvers.results import BenchmarkResults
 from bench.solvers.speed import work_precision
@@ -29,15 +30,11 @@ from bench.studies import ROOT, SCALE, count, fill_tables, write_text
 from palpate.cli.figures import figure_file
 from palpate.plotting.look import grid, legend_above
 
-PROGRAMS = ROOT / "build" / "release" / "bench"
-
 
 def output(program: str, *arguments: str) -> str:
     """Returns what a program of this study prints."""
-    path = PROGRAMS / program
-    if not path.exists():
-        raise SystemExit(f"{path} does not exist: cmake --build --preset release --target {program}")
-    return subprocess.run([path, *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
+    command = [studies.program(program), *arguments]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 def search(to: Path) -> None:

@@ -42,7 +42,7 @@ from palpate.plotting.look import grid
 
 INPUTS = (2, 3, 6)
 
-ROWS = (2_000, 20_000, 100_000)
+ROWS = (2_000, 20_000, 100_000) if SCALE >= 0.1 else (200,)
 
 NOISE = 0.02
 """Standard deviation of the noise divided by that of the force"""
@@ -220,8 +220,7 @@ def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    default_rows = ROWS if SCALE >= 0.1 else ROWS[:1]
-    parser.add_argument("rows", nargs="*", type=int, default=list(default_rows))
+    parser.add_argument("rows", nargs="*", type=int, default=list(ROWS))
     parser.add_argument("--inputs", nargs="*", type=int, default=list(INPUTS if SCALE >= 0.1 else INPUTS[:2]))
     parser.add_argument("--draws", type=int, default=count(12))
     parser.add_argument("--only", nargs="*", default=None, help="names of methods")

@@ -31,11 +31,10 @@ from palpate.cli.printing import number
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.studies import ROOT, fill_tables, markdown_table, where, write_json
+from bench.studies import fill_tables, markdown_table, program, where, write_json
 
 from palpate.plotting.look import grid
 
-PROGRAM = ROOT / "build" / "release" / "bench" / "failure_maps"
 PAGE = "where-each-method-fails.md"
 
 MARKERS = "os^Dv"
@@ -191,10 +190,10 @@ def main() -> None:
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
     parser.add_argument("--points", type=int, default=9, help="values along each axis")
     options = parser.parse_args()
-    if not PROGRAM.exists():
-        raise SystemExit(f"{PROGRAM} does not exist: cmake --build --preset release --target failure_maps")
     start = time.perf_counter()
-    completed = subprocess.run([PROGRAM, str(options.points)], stdout=subprocess.PIPE, check=True)
+    completed = subprocess.run(
+        [program("failure_maps"), str(options.points)], stdout=subprocess.PIPE, check=True
+    )
     write(json.loads(completed.stdout), options.to, time.perf_counter() - start)
 
 

@@ -29,11 +29,10 @@ from palpate.cli.printing import number
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.studies import ROOT, SCALE, count, fill_tables, markdown_table, where, write_text
+from bench.studies import SCALE, count, fill_tables, markdown_table, program, where, write_text
 
 from palpate.plotting.look import grid
 
-PROGRAM = ROOT / "build" / "release" / "bench" / "rivals"
 PAGE = "rivals.md"
 
 DRAWS = 20
@@ -320,9 +319,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
     options = parser.parse_args()
-    if not PROGRAM.exists():
-        raise SystemExit(f"{PROGRAM} does not exist: cmake --build --preset release --target rivals")
-    command = [str(PROGRAM), str(count(DRAWS)), str(EVERY)]
+    command = [str(program("rivals")), str(count(DRAWS)), str(EVERY)]
     completed = subprocess.run(command, stdout=subprocess.PIPE, check=True)
     write(json.loads(completed.stdout), options.to, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime)
 
