@@ -59,6 +59,7 @@ def test_a_press_curve_is_that_of_the_press() -> None:
     assert held_objects.press_curve(key, 2.0).force(x) == pytest.approx(2.0 * key.force(x, direction=1.0))
 
 
+@pytest.mark.full
 def test_a_held_line_certifies_steeper_multiples_of_a_press_curve() -> None:
     moteus = DeviceProfile.load(example_profiles()["moteus-r4"][0])
     found = held_objects.curve_on(key_by_hand(), moteus)

@@ -2,6 +2,7 @@
 """Designer's numbers of a force curve, and curves that are changed by them."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ def test_a_contact_behind_the_stop_is_refused() -> None:
 
 
 def test_an_edited_object_is_identified_with_its_numbers() -> None:
-    model = palpate.identify(recording_of(switch(), model_of(switch()), "none"))
+    model = palpate.identify(recording_of(switch(), model_of_the_switch(), "none"))
     found = edited(Curves.of(model), {"peak force": 0.6, "hysteresis": 0.5})
     recording = recording_of(found, model, "peak force 0.6 N")
     assert recording.metadata["edited"].startswith("peak force 0.6 N; from the model of")
@@ -82,12 +83,13 @@ def test_an_edited_object_is_identified_with_its_numbers() -> None:
     assert value_of(again, "lost work") == pytest.approx(0.5 * value_of(switch(), "lost work"), rel=0.02)
 
 
-def model_of(curves: Curves) -> palpate.Model:
-    return palpate.identify(curves.position, curves.press)
+@cache
+def model_of_the_switch() -> palpate.Model:
+    return palpate.identify(switch().position, switch().press)
 
 
 def test_an_edited_recording_keeps_the_units_of_the_file(tmp_path: Path) -> None:
-    made = recording_of(switch(), model_of(switch()), "peak force 60 gf")
+    made = recording_of(switch(), model_of_the_switch(), "peak force 60 gf")
     made = replace(made, units={"position": "m", "force": "N"})
     write_recording(made, {"position": UNITS["mm"], "force": UNITS["gf"]}, tmp_path / "edited.csv")
     read = palpate.read_recording(tmp_path / "edited.csv")

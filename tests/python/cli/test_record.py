@@ -116,6 +116,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     assert stiffness(identify(read_recording(rendered_file))) == pytest.approx(STIFFNESS, rel=0.02)
 
 
+@pytest.mark.full
 @needs_emulation
 def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
@@ -136,7 +137,11 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
 
 
 @needs_emulation
-@pytest.mark.parametrize("arguments", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
+@pytest.mark.parametrize(
+    "arguments",
+    [pytest.param([], marks=pytest.mark.full), ["--force-limit", 0.05]],
+    ids=["default", "the device's own"],
+)
 def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], tmp_path: Path) -> None:
     """A torque limit of 50000 uNm allows the probe 0.05 N*m, although 1e-6 * 50000 is slightly less."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"

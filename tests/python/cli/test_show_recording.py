@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from conftest import sampled
 from models_by_hand import model_by_hand
 from palpate import Recording, read_recording
 from palpate.cli.main import main
@@ -93,7 +94,7 @@ def test_json_counts_the_rows_of_each_role(tmp_path: Path, capsys: pytest.Captur
     assert "on 397 of 460 rows" in printed(capsys)["error"]
 
 
-@pytest.mark.parametrize("name", ["timed", "strokes"])
+@pytest.mark.parametrize("name", sampled(["timed", "strokes"], "strokes"))
 def test_the_views_are_drawn(
     name: str, timed: Path, strokes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,7 +113,7 @@ def test_the_frame_of_a_model_is_drawn(tmp_path: Path) -> None:
     assert frame.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", ["model", "recording"])
+@pytest.mark.parametrize("name", sampled(["model", "recording"], "model"))
 def test_the_figure_of_the_frame_has_the_given_settings(name: str, timed: Path, tmp_path: Path) -> None:
     file = timed if name == "recording" else model_by_hand().save(tmp_path / "m.json")
     frame = tmp_path / "frame.svg"
@@ -152,7 +153,7 @@ def test_settings_of_the_frame_without_its_figure_are_refused(
     assert "--b0 is a setting of the figure --plot-frame PNG" in " ".join(capsys.readouterr().err.split())
 
 
-@pytest.mark.parametrize("rows", [9, 10, 11])
+@pytest.mark.parametrize("rows", sampled([9, 10, 11], 9, 10))
 def test_a_recording_of_few_rows_is_refused_or_drawn(
     rows: int, tmp_path: Path, csv_file: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

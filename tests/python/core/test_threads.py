@@ -34,7 +34,7 @@ def rendering() -> Any:
 
 def fitting() -> Any:
     x = np.linspace(0.0, 1.0, 200)
-    fitted = fit_environment(x[:, None], np.sin(6.0 * x), None, IdentifyOptions(max_wavelets=4))
+    fitted = fit_environment(x[:, None], np.sin(6.0 * x), None, IdentifyOptions(max_wavelets=2))
     return [fitted.weight, fitted.alpha]
 
 

@@ -412,7 +412,11 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
 @pytest.mark.parametrize(
     ("fault", "named"),
     [
-        ("emergency-stop", "reports an emergency stop; remove the cause of the fault"),
+        pytest.param(
+            "emergency-stop",
+            "reports an emergency stop; remove the cause of the fault",
+            marks=pytest.mark.full,
+        ),
         pytest.param(
             "over-temperature",
             "reports over-temperature; remove the cause of the fault",

@@ -121,6 +121,7 @@ def test_the_sources_agree_with_the_headers_of_the_standard(compiler: str, tmp_p
         subprocess.run([*command, *more, str(tmp_path / "sources" / "fmu.c")], check=True)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
 def test_fmpy_compiles_the_sources_to_the_same_force(tmp_path: Path, fmpy: Any) -> None:
     model = keyswitch_by_hand()

@@ -129,7 +129,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
 @pytest.mark.parametrize(
     ("folder", "every", "median"),
     [
-        ("keyswitches", 4, 0.025),
+        pytest.param("keyswitches", 4, 0.025, marks=pytest.mark.full),
         pytest.param("rubber_domes", 4, 0.0125, marks=pytest.mark.full),
         ("switch_springs", 4, 0.024),
     ],

@@ -116,6 +116,7 @@ def test_the_rendered_force_is_that_of_the_object_and_its_damping(planned: Plan)
     assert np.abs(beyond[after & rest]).max() < 0.01 * planned.model.force(0.05)
 
 
+@pytest.mark.full
 def test_a_rendering_can_be_identified(planned: Plan) -> None:
     device = pedal()
     rendered = palpate.simulate(planned, device, hand_for(planned, device), 4.0)

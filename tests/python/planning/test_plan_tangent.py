@@ -130,6 +130,7 @@ def test_a_profile_with_a_loop_is_saved_and_loaded(tmp_path: Path) -> None:
     assert DeviceProfile.load(path) == motor()
 
 
+@pytest.mark.full
 def test_the_moteus_renders_several_times_stiffer_walls() -> None:
     device = DeviceProfile.load(example_profiles()["moteus-r4"][0])
     assert stiffest_line_wall(device, 0.01, 3e-3) >= 3.0 * 0.9902

@@ -340,6 +340,7 @@ def test_a_force_that_changes_with_the_speed_is_not_called_another_object() -> N
     assert re.search(r"0.005 m at 0.0012\d* m/s before it, 0.005 m at 0.00\d+ m/s after it", sentence)
 
 
+@pytest.mark.full
 def test_a_force_that_the_velocity_explains_has_not_changed() -> None:
     model = palpate.identify(slow_then_fast())
     assert model.damping is not None

@@ -3,6 +3,7 @@
 
 import contextlib
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,7 @@ POSITION_UNITS = {"m": ("m", "mm", "um", "µm", "cm", "in"), "rad": ("rad", "deg
 FORCE_UNITS = {"N": ("N", "mN", "kN", "gf", "lbf", "ozf"), "N*m": ("Nm", "mNm", "N·m", "N*mm", "N.cm")}
 
 
+@cache
 def sources() -> list[Recording]:
     """Returns clean recordings of a few hundred rows: measured ones, or the built-in sample."""
     folder = measured_data()
@@ -165,7 +167,7 @@ def read(path: Path) -> Recording:
     return read_recording(path, **options_in(str(refused.value)))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", sampled(range(VARIANTS), *range(0, VARIANTS, 11)))
+@pytest.mark.parametrize("seed", sampled(range(VARIANTS), *range(1, VARIANTS, 11)))
 def test_a_variant_is_read_as_the_clean_recording(tmp_path: Path, seed: int) -> None:
     random = np.random.default_rng(seed)
     all_sources = sources()

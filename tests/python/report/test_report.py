@@ -16,8 +16,12 @@ from models_by_hand import keyswitch_by_hand, model_by_hand, relaxing_by_hand
 from palpate import DeviceProfile, InputError, Model, Recording
 from palpate.planning import example_profiles
 from palpate.report import Subject, report_of, write_report
+from palpate.report.of_comparison import force_curve, whiteness
+from palpate.report.of_model import provenance, wavelets
+from palpate.report.of_plan import certificate_table, rendered
 from palpate.report.page import Section, html_of
 from palpate.report.report import sections_of
+from palpate.report.summary import key_numbers, verdict
 from palpate.report.words import counted
 from palpate.verdict import Verdict, no, usable
 from parsed import Parsed
@@ -43,6 +47,15 @@ def recording(model: Model, *, noise: float = 0.01, seed: int = 0, n: int = 300)
 
 def parsed(model: Model | Path, *recordings: Recording) -> Parsed:
     return Parsed(report_of(Subject.of(model).compared_with(*recordings or (None,))).html)
+
+
+def part(subject: Subject, *sections: Callable[[Subject], Section]) -> Parsed:
+    """Returns a page of some sections: most time is spent on the charts of the others."""
+    return Parsed(html_of("title", "subtitle", [section(subject) for section in sections]))
+
+
+def compared(model: Model | Path, *recordings: Recording) -> Subject:
+    return Subject.of(model).compared_with(*recordings or (None,))
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +175,7 @@ def test_a_hysteresis_model_shows_press_and_release_with_its_band() -> None:
     given = recording(keyswitch_by_hand())
     model = palpate.identify(given)
     assert model.hysteretic
-    text = parsed(model, given).text["force-curve"]
+    text = part(compared(model, given), force_curve).text["force-curve"]
     for entry in ("recorded, press", "recorded, release", "model, press", "model, release", "95 % band"):
         assert entry in text
     assert "Without band" not in text
@@ -174,7 +187,7 @@ def test_a_periodic_model_is_drawn_within_one_period() -> None:
     turns = Recording.from_arrays(x, model.force(x), units=model.units)
     subject = Subject.of(model).compared_with(turns)
     assert subject.folded(x).max() <= 0.5
-    page = Parsed(report_of(subject).html)
+    page = part(subject, force_curve, provenance)
     assert "repeats every 0.5 rad" in page.text["provenance"]
     assert "Left out" not in page.text["force-curve"]
 
@@ -185,7 +198,7 @@ def test_a_model_of_several_inputs_is_compared_without_curve() -> None:
     given = Recording.from_arrays(
         x, np.sin(3.0 * x) * side + 0.01 * random.normal(size=400), inputs={"lateral_m": side}
     )
-    page = parsed(palpate.identify(given), given)
+    page = part(compared(palpate.identify(given), given), force_curve, wavelets)
     assert "Left out: the model has the inputs position, lateral_m" in page.text["wavelets"]
     assert "its inputs are position, lateral_m" in page.text["force-curve"]
     assert "equal forces" in page.text["force-curve"]
@@ -208,7 +221,8 @@ def test_a_model_of_velocity_is_rendered_and_drawn_without_curve() -> None:
     force = model.predict(np.column_stack([x, velocity]))
     device = DeviceProfile(viscous_damping=1.0, coulomb_friction=1.0)
     planned = palpate.plan(model, device).stored()
-    page = parsed(planned, Recording.from_arrays(x, force, time, units=model.units))
+    given = Recording.from_arrays(x, force, time, units=model.units)
+    page = part(compared(planned, given), force_curve, rendered)
     assert "its inputs are position, velocity" in page.text["force-curve"]
     assert "Device and hand are simulated" in page.text["rendered"]
 
@@ -227,7 +241,8 @@ def test_a_changed_model_is_reported_with_the_refused_plan(planned: Model, tmp_p
     content["slope_bounds"] = None
     file = tmp_path / "changed.json"
     file.write_text(json.dumps(content), encoding="utf-8")
-    page = parsed(file, recording(model_by_hand(), seed=1))
+    subject = compared(file, recording(model_by_hand(), seed=1))
+    page = part(subject, verdict, key_numbers, rendered, certificate_table)
     assert "the model, its units or its certificate was changed" in page.text["verdict"]
     assert page.text["verdict"].startswith("Verdict no")
     assert "Left out: the plan is refused" in page.text["rendered"]
@@ -240,7 +255,7 @@ def test_a_plan_that_cannot_be_read_leaves_the_model_readable(planned: Model, tm
     content["plan"]["structure"] = "telepathic"
     file = tmp_path / "unknown.json"
     file.write_text(json.dumps(content), encoding="utf-8")
-    page = parsed(file)
+    page = part(compared(file), verdict, certificate_table)
     assert "telepathic" in page.text["verdict"]
     assert "Left out: the plan in the model file cannot be read" in page.text["certificate"]
 
@@ -281,7 +296,7 @@ def test_the_origin_names_files_fingerprints_rows_and_versions(tmp_path: Path) -
     given.write(tmp_path / "a.csv")
     read = palpate.read_recording(tmp_path / "a.csv", rows=(0, 500))
     palpate.identify(read).save(tmp_path / "m.json")
-    text = parsed(tmp_path / "m.json", read).text["provenance"]
+    text = part(compared(tmp_path / "m.json", read), provenance).text["provenance"]
     assert read.source.sha256 in text
     assert "500 rows read of 600 in the file" in text
     assert f"palpate {palpate.__version__}" in text
@@ -296,7 +311,7 @@ def test_held_out_rows_are_compared_and_the_others_give_the_band() -> None:
     assert subject.verification is not None
     assert subject.verification.fresh
     assert subject.verification.n == len(given) // 5
-    assert "Without band" not in Parsed(report_of(subject).html).text["force-curve"]
+    assert "Without band" not in part(subject, force_curve).text["force-curve"]
 
 
 def test_a_recording_of_another_object_is_refused_for_the_band(planned: Model) -> None:
@@ -330,7 +345,7 @@ def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(tmp_path:
 def test_residuals_without_time_are_in_the_order_of_position(
     planned: Model, change: Callable[[Recording], Recording]
 ) -> None:
-    page = parsed(planned, change(recording(model_by_hand(), seed=1)))
+    page = part(compared(planned, change(recording(model_by_hand(), seed=1))), whiteness)
     assert "in the order of position" in page.text["whiteness"]
 
 
@@ -338,7 +353,7 @@ def test_the_section_of_a_plan_states_the_profile_of_the_device() -> None:
     subject = Subject.of(keyswitch_by_hand()).planned_on(DeviceProfile.load(example_profiles()["touch"][0]))
     assert subject.plan is not None
     assert subject.plan.verdict.level == "no"
-    text = Parsed(report_of(subject).html).text["certificate"]
+    text = part(subject, certificate_table).text["certificate"]
     for number in (
         "viscous damping b: 0.05 N·s/m",
         "Coulomb friction f_c: 0.13 N",
@@ -367,16 +382,16 @@ def test_notes_of_the_file_are_words_and_no_json(planned: Model) -> None:
     model = Model.from_dict(planned.to_dict())
     model.notes["roles"] = {"moving": 590, "left out": 10}
     model.notes["setup"] = [{"screw": 0.123456, "cells": [1, 2]}, None]
-    text = parsed(model).text["provenance"]
+    text = part(compared(model), provenance).text["provenance"]
     assert "moving: 590, left out: 10" in text
     assert "screw: 0.1235, cells: 1, 2" in text
     assert not set('{}"') & set(text)
 
 
-def labels(section: str, subject: Subject) -> list[str]:
-    """Returns the labels of the vertical axes of a section."""
-    found = next(each for each in sections_of(subject) if each.key == section)
-    return [panel.plot.yaxis.axis_label for chart in found.charts for panel in chart.panels]
+def labels(subject: Subject) -> list[str]:
+    """Returns the labels of the vertical axes of the force curve."""
+    charts = force_curve(subject).charts
+    return [panel.plot.yaxis.axis_label for chart in charts for panel in chart.panels]
 
 
 @pytest.mark.parametrize("hysteresis", [True, False])
@@ -384,8 +399,8 @@ def test_the_energy_of_a_rotary_object_is_drawn_over_its_angle(*, hysteresis: bo
     extra = {"weight_hysteresis": [0.0], "bias_hysteresis": 0.1, "linear_hysteresis": [0.0]}
     rotary = model_by_hand(units={"position": "rad", "force": "N*m"}, **(extra if hysteresis else {}))
     linear = model_by_hand(units={"position": "m", "force": "N"})
-    assert any(label.startswith("energy [") for label in labels("force-curve", Subject.of(rotary)))
-    assert not any(label.startswith("energy [") for label in labels("force-curve", Subject.of(linear)))
+    assert any(label.startswith("energy [") for label in labels(Subject.of(rotary)))
+    assert not any(label.startswith("energy [") for label in labels(Subject.of(linear)))
 
 
 def test_a_model_with_memory_is_drawn_along_the_recording() -> None:
@@ -395,7 +410,7 @@ def test_a_model_with_memory_is_drawn_along_the_recording() -> None:
     force, _ = model.force_over_time(time, x)
     relaxing = Recording.from_arrays(x, force, time, units=model.units)
     subject = Subject.of(model).compared_with(relaxing)
-    section = next(each for each in sections_of(subject) if each.key == "force-curve")
+    section = force_curve(subject)
     over_time = section.charts[-1].panels[0].plot
     assert over_time.xaxis.axis_label == "time [s]"
     drawn = [each.data_source.data["y"] for each in over_time.renderers]

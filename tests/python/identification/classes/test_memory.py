@@ -79,6 +79,7 @@ def pressed_twice() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time, position, 0.3 * np.sin(9.0 * position)
 
 
+@pytest.mark.full
 def test_a_branch_has_fewer_parameters_than_a_network_of_position_and_velocity() -> None:
     """At one speed of pressing, both fit the force down to its noise."""
     time, position, wave = pressed_twice()
@@ -264,6 +265,7 @@ def test_measured_relaxation_of_four_stretches_is_one_model(data: Path) -> None:
     assert model.verdict.level == "good"
 
 
+@pytest.mark.full
 def test_friction_that_creeps_in_pauses_gives_no_memory() -> None:
     """The rows of the pauses alone would accept a memory: they are half of the recording."""
     step, pause = 0.01, 1500

@@ -85,6 +85,7 @@ def test_recordings_of_different_strokes_have_no_band() -> None:
     assert NO_BAND in model.notes["identification"]
 
 
+@pytest.mark.full
 def test_recordings_of_different_speeds_keep_their_damping() -> None:
     random = np.random.default_rng(0)
     made = []

@@ -228,6 +228,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
         assert np.count_nonzero(found != recording.direction) <= 0.01 * len(recording), path.name
 
 
+@pytest.mark.full
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
     """The NRMSE is at most 1.05 times that of the file with directions; equal strokes give equal models."""
     for path in measured_files(data):

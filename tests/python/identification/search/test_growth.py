@@ -90,6 +90,7 @@ def errors_between_rows(found: Grown, law: Callable[[Float1D, Float1D], Float1D]
     return np.asarray(np.column_stack([np.ones(len(x)), x, wavelets]) @ coefficients - law(x[:, 0], x[:, 1]))
 
 
+@pytest.mark.full
 def test_smooth_force_over_two_inputs_has_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
     """Between distant rows, wide wavelets have less than half the error of the best fit of the rows."""
     problem = over_two_inputs(smooth, 200)
