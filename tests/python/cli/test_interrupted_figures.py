@@ -39,7 +39,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ["simulate", "m.json", "-o", "r.csv", "--duration-s", "1", "--plot", "p.png"],
         ["plan", "m.json", "--device", "bench-knob", "-o", "new.json", "--plot", "p.png"],
         ["show", "m.json", "--beside", "m.json", "--plot", "p.png"],
-        ["show", "a.csv", "--plot", "p.png", "--plot-frame", "frame.png"],
+        pytest.param(
+            ["show", "a.csv", "--plot", "p.png", "--plot-frame", "frame.png"], marks=pytest.mark.full
+        ),
     ],
 )
 def test_ctrl_c_while_the_last_figure_is_drawn_writes_nothing(

@@ -34,7 +34,8 @@ def rendering() -> Any:
 
 def fitting() -> Any:
     x = np.linspace(0.0, 1.0, 200)
-    fitted = fit_environment(x[:, None], np.sin(6.0 * x), None, IdentifyOptions(max_wavelets=2))
+    force = np.sin(6.0 * x) + np.random.default_rng(0).normal(0.0, 0.05, len(x))
+    fitted = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=2))
     return [fitted.weight, fitted.alpha]
 
 

@@ -232,7 +232,7 @@ HOSTILE = (
 """Parts of names that end a string, a comment or a line of C, or that the template of a header contains."""
 
 
-@pytest.mark.parametrize("seed", range(6 * SCALE))
+@pytest.mark.parametrize("seed", range(3 if SCALE == 1 else 6 * SCALE))
 def test_names_of_model_file_and_device_cannot_change_the_program(seed: int, tmp_path: Path) -> None:
     random = np.random.default_rng(seed)
     name = "".join(HOSTILE) if seed == 0 else "".join(random.choice(HOSTILE, 12))
@@ -265,7 +265,9 @@ def test_words_of_the_template_are_kept_in_names(tmp_path: Path) -> None:
     assert f" on {name} at 1000 Hz" in certificate
 
 
-@pytest.mark.parametrize("name", ["TABLE", "NAME", "PROFILE", "DEVICE", "STRUCTURE"])
+@pytest.mark.parametrize(
+    "name", sampled(["TABLE", "NAME", "PROFILE", "DEVICE", "STRUCTURE"], "TABLE", "STRUCTURE")
+)
 def test_a_word_of_the_template_can_be_the_name_of_a_model(name: str, tmp_path: Path) -> None:
     model, tables = tables_of("predicted_hysteresis")
     header = header_of(model, tables, tmp_path, name)

@@ -23,7 +23,6 @@ def test_a_corrupted_recording_gives_a_correct_error_or_a_warning_that_names_a_c
         base_names(),
         "sample",
         "P1",
-        "loop",
         "sweeps",
         "keyswitches/clicky__cherry_mx_blue.csv",
     ),
