@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the command line without the functions and modules that only Linux has."""
+"""Runs command lines, one after the other, without the functions and modules that only Linux has."""
 
 import importlib.abc
 import os
+import shlex
 import sys
 from typing import Any
 
@@ -23,4 +24,6 @@ sys.meta_path.insert(0, Absent())
 
 from palpate.cli.main import main  # noqa: E402
 
-sys.exit(main(sys.argv[1:]))
+for line in sys.argv[1:]:
+    if code := main(shlex.split(line)):
+        sys.exit(f"exit code {code}: {line}")

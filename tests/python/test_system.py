@@ -16,27 +16,23 @@ from palpate.recording.files import replacing
 PROGRAM = Path(__file__).with_name("another_system.py")
 
 
-def on_another_system(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=folder, capture_output=True, text=True)
-
-
 def test_all_verbs_without_a_device_work_on_another_system(tmp_path: Path) -> None:
     (tmp_path / "press.csv").write_text(
         "time_s,position_mm,force_N\n"
         + "".join(f"{0.001 * k:.3f},{0.01 * k:.2f},{0.02 * k + 0.01 * (k % 3):.3f}\n" for k in range(200))
     )
-    for arguments in (
-        ["identify", "press.csv", "-o", "press.json"],
-        ["verify", "press.json", "press.csv"],
-        ["plan", "press.json", "--device", "voice-coil", "-o", "press.json"],
-        ["simulate", "press.json", "--duration-s", "0.5"],
-        ["report", "press.json", "press.csv", "-o", "press.html"],
-        ["export", "press.json", "--c", "-o", "press.h"],
-        ["show", "press.csv"],
-    ):
-        done = on_another_system(tmp_path, *arguments)
-        assert "Traceback" not in done.stderr
-        assert done.returncode == 0, (arguments, done.stderr, done.stdout)
+    lines = (
+        "identify press.csv -o press.json",
+        "verify press.json press.csv",
+        "plan press.json --device voice-coil -o press.json",
+        "simulate press.json --duration-s 0.5",
+        "report press.json press.csv -o press.html",
+        "export press.json --c -o press.h",
+        "show press.csv",
+    )
+    done = subprocess.run([sys.executable, PROGRAM, *lines], cwd=tmp_path, capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, (done.stderr, done.stdout)
 
 
 @pytest.mark.parametrize("verb", ["render", "record", "devices", "check-device"])
