@@ -82,6 +82,7 @@ def test_the_shown_commands_make_the_same_files(
         assert (folder / file.name).read_bytes() == file.content, file.name
 
 
+@pytest.mark.full
 def test_the_header_of_a_plan_that_is_not_proved_is_exported_as_such(
     session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

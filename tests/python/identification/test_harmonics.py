@@ -61,6 +61,7 @@ def test_narrow_detents_get_wavelets(width: float, most: int) -> None:
     assert np.sqrt(np.mean((model.force(x) - force) ** 2)) < 0.002
 
 
+@pytest.mark.full
 def test_friction_of_a_periodic_force_has_its_own_harmonics() -> None:
     time = 1e-3 * np.arange(8000)
     angle = TURN * (1.0 - np.cos(TURN * time / 4.0))

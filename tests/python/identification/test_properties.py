@@ -130,7 +130,7 @@ def test_a_change_of_units_changes_the_units_of_the_model_only(kind: str) -> Non
         assert_equal(kind, model, forces(model, position=x) / f)
 
 
-@pytest.mark.parametrize("kind", sampled(KINDS, "position", "hysteresis"))
+@pytest.mark.parametrize("kind", sampled(KINDS, "position"))
 def test_units_of_powers_of_two_give_the_same_model_bit_by_bit(kind: str) -> None:
     x, f = 2.0**20, 2.0**-20
     model = identified(changed(recorded(kind), position=x, force=f), kind)

@@ -115,6 +115,7 @@ def test_rows_without_direction_are_used_if_hysteresis_is_not_accepted() -> None
     assert "hysteresis: not accepted (" in sentences(network)
 
 
+@pytest.mark.full
 def test_strokes_that_gain_energy_do_not_become_a_rapidly_changing_force() -> None:
     """In a periodic motion press and release are sampled at different positions; the alternation of both
     forces is not a force of position."""
