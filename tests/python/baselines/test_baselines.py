@@ -160,7 +160,7 @@ def test_time_gives_velocity_and_acceleration() -> None:
 
 
 def test_command_prints_baselines_with_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = press_and_release(n=200).write(tmp_path / "press.csv")
+    file = press_and_release().write(tmp_path / "press.csv")
     model = tmp_path / "press.json"
     command = ["identify", str(file), "-o", str(model), "--hold-out-every", "5", "--baselines"]
     assert main(command) == 0
