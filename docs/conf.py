@@ -126,6 +126,6 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", python_pages.escape_formulas, priority=400)
     app.connect("autodoc-process-signature", python_pages.shorten_signature)
     app.connect("source-read", site_links.inside_the_site)
-    app.connect("write-started", navigation.select_titles)
-    # Before the theme, which makes the navigation.
-    app.connect("html-page-context", navigation.use_titles, priority=400)
+    # Before the theme, which makes the navigation, and behind it.
+    app.connect("html-page-context", navigation.leave_out, priority=400)
+    app.connect("html-page-context", navigation.add, priority=600)
