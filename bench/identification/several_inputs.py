@@ -187,8 +187,14 @@ def table(results: Sequence[Mapping[str, Any]]) -> str:
     return markdown_table(("problem", *errors, "parameters of palpate", *times), lines)
 
 
+def _rows(row: Mapping[str, Any]) -> int:
+    """Returns the number of rows of a result."""
+    return int(row["problem"].split()[-2])
+
+
 def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
     """Draws error over time of all methods, a panel for each number of inputs; larger marks: more rows."""
+    sizes = sorted({_rows(row) for row in results})
     measured = [each for each in INPUTS if any(f", {each} inputs, " in row["problem"] for row in results)]
     with figure_file(path, height_inches=1.0 + 1.5 * len(measured), rows=[1.0] * len(measured)) as panels:
         for axes, inputs in zip(panels, measured, strict=True):
@@ -201,7 +207,7 @@ def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
                 axes.scatter(
                     [row["fit_s"] + row["tuning_s"] for row in rows],
                     [row["nrmse"] for row in rows],
-                    [5.0 * (1 + ROWS.index(int(row["problem"].split()[-2]))) ** 1.5 for row in rows],
+                    [5.0 * (1 + sizes.index(_rows(row))) ** 1.5 for row in rows],
                     marker=marker,
                     facecolor=color,
                     edgecolor="black",
@@ -221,7 +227,7 @@ def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rows", nargs="*", type=int, default=list(ROWS))
-    parser.add_argument("--inputs", nargs="*", type=int, default=list(INPUTS if SCALE >= 0.1 else INPUTS[:2]))
+    parser.add_argument("--inputs", nargs="*", type=int, default=list(INPUTS if SCALE >= 0.1 else INPUTS[:1]))
     parser.add_argument("--draws", type=int, default=count(12))
     parser.add_argument("--only", nargs="*", default=None, help="names of methods")
     parser.add_argument("--json", type=Path, default=None)
