@@ -159,15 +159,23 @@ def test_time_gives_velocity_and_acceleration() -> None:
     assert table["lookup table"].nrmse > 0.05
 
 
+def with_baselines(folder: Path, *options: str) -> int:
+    """Identifies a recording with all baselines; returns the exit code."""
+    file = press_and_release().write(folder / "press.csv")
+    command = ["identify", str(file), "-o", str(folder / "press.json"), "--hold-out-every", "5"]
+    return main([*command, "--baselines", *options])
+
+
 def test_command_prints_baselines_with_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = press_and_release().write(tmp_path / "press.csv")
-    model = tmp_path / "press.json"
-    command = ["identify", str(file), "-o", str(model), "--hold-out-every", "5", "--baselines"]
-    assert main(command) == 0
+    assert with_baselines(tmp_path) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("wavelet network") for line in lines)
     assert any(line.startswith("smoothing spline, two strokes") for line in lines)
-    assert main([*command, "--json"]) == 0
+
+
+@pytest.mark.full
+def test_baselines_are_a_field_of_the_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert with_baselines(tmp_path, "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert {"name", "nrmse", "n_parameters", "seconds", "refused"} == set(printed["baselines"][0])
 
