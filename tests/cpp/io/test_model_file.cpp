@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the model-file reader with the valid and invalid files in tests/models.
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <numbers>
 #include <optional>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -165,16 +167,19 @@ TEST(ModelFile, ReportsAMissingFile) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }
 
-/// Returns the error message of reading a file with this content.
+/// Returns the error message of reading a file with this content. Tests run at the same time, each with its own file.
 std::string refusal(const std::string& content) {
-    const std::string path = testing::TempDir() + "refused.json";
+    const std::string path =
+        testing::TempDir() + "refused-" + std::to_string(std::random_device{}()) + ".json";
     std::ofstream{path} << content;
+    std::string message;
     try {
         (void)read_json(path);
     } catch (const std::invalid_argument& error) {
-        return std::string(error.what()).substr(path.size());
+        message = std::string(error.what()).substr(path.size());
     }
-    return "";
+    std::filesystem::remove(path);
+    return message;
 }
 
 TEST(ModelFile, RefusesALargeFileBeforeItIsRead) {
