@@ -86,6 +86,7 @@ MEANINGS = {
         "",
         "The controller must limit the force of the line, because a limit in the host is late.",
     ),
+    "line-spring": ("", "A controller that takes springs holds lines of one slope only."),
     "line-delay": ("time", "No proof covers a delay with a line of this rule."),
     "line-hysteresis": ("stiffness", "No proof covers hysteresis with a line of this rule."),
     "line-stiffness": ("stiffness", "The controller must be able to hold the slope of the line."),
