@@ -167,7 +167,7 @@ TEST(ModelFile, ReportsAMissingFile) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }
 
-/// Returns the error message of reading a file with this content. Tests run at the same time, each with its own file.
+/// Returns the error message of reading a file with this content, in a new file because tests run at the same time.
 std::string refusal(const std::string& content) {
     const std::string path =
         testing::TempDir() + "refused-" + std::to_string(std::random_device{}()) + ".json";
