@@ -12,15 +12,10 @@ import contextlib
 import math
 import socket
 import struct
-import sys
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
-from threading import Thread
-from typing import TypeVar
 
 CAN = struct.Struct("=IB3x8s")
 """A struct can_frame of Linux: number, length, data"""
@@ -28,8 +23,6 @@ CAN_FD = struct.Struct("=IBB2x64s")
 """A struct canfd_frame of Linux: number, length, flags, data"""
 STEP_S = 1e-3
 SUBSTEPS = 20
-
-_Motor = TypeVar("_Motor", bound="CanMotor")
 
 
 @dataclass
@@ -132,33 +125,3 @@ class CanMotor(ABC):
             while frame := connection.recv(CAN_FD.size):
                 for answer in self.replies(frame):
                     connection.send(answer)
-
-
-def _bus(path: Path) -> socket.socket:
-    """Returns a listening socket of this name."""
-    bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    bus.bind(str(path))
-    bus.listen()
-    return bus
-
-
-@contextlib.contextmanager
-def emulated(path: Path, motor: _Motor) -> Iterator[_Motor]:
-    """Runs a drive on a bus of this name as long as the context lasts."""
-
-    def run() -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                motor.serve(bus.accept()[0])
-
-    with _bus(path) as bus:
-        Thread(target=run, daemon=True).start()
-        yield motor
-        bus.shutdown(socket.SHUT_RDWR)
-
-
-def main(motor: CanMotor) -> None:
-    """Runs a drive on the bus that the command line names, until the program is ended."""
-    bus = _bus(Path(sys.argv[1]))
-    while True:
-        motor.serve(bus.accept()[0])

@@ -16,14 +16,11 @@ import math
 import select
 import socket
 import struct
-import sys
 import time
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
-from threading import Thread
-from typing import Any
+
+from emulated_device import main
 
 STEP_S = 1e-3
 SUBSTEPS = 10
@@ -376,32 +373,5 @@ class Wheel:
                         connection.send(answer)
 
 
-def _bus(path: Path) -> socket.socket:
-    """Returns a listening socket of this name."""
-    bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    bus.bind(str(path))
-    bus.listen()
-    return bus
-
-
-@contextlib.contextmanager
-def emulated_wheel(path: Path, **fields: Any) -> Iterator[Wheel]:
-    """Runs a wheel on a socket of this name as long as the context lasts."""
-    wheel = Wheel(**fields)
-
-    def run() -> None:
-        with contextlib.suppress(OSError):
-            while True:
-                wheel.serve(bus.accept()[0])
-
-    with _bus(path) as bus:
-        Thread(target=run, daemon=True).start()
-        yield wheel
-        bus.shutdown(socket.SHUT_RDWR)
-
-
 if __name__ == "__main__":
-    listening = _bus(Path(sys.argv[1]))
-    emulated = Wheel()
-    while True:
-        emulated.serve(listening.accept()[0])
+    main(Wheel())

@@ -11,7 +11,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, field
 
-from can_motor import CAN, CanMotor, main
+from can_motor import CAN, CanMotor
+from emulated_device import main
 
 P_MAX, V_MAX, T_MAX, KP_MAX, KD_MAX = 12.5, 30.0, 10.0, 500.0, 5.0
 

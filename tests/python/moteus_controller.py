@@ -13,7 +13,8 @@ import math
 import struct
 from dataclasses import dataclass
 
-from can_motor import CAN_FD, CanMotor, main
+from can_motor import CAN_FD, CanMotor
+from emulated_device import main
 
 TURN = 2.0 * math.pi
 EXTENDED = 0x80000000

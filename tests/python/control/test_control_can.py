@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from can_motor import emulated
 from conftest import ROOT
 from control_program import PROGRAM, every_row, needs_program
+from emulated_device import emulated
 from mit_drive import Drive
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from can_motor import CanMotor, emulated
+from can_motor import CanMotor
 from control_program import control, every_row, needs_program
+from emulated_device import emulated
 from mit_drive import Drive
 from models_by_hand import model_by_hand
 from moteus_controller import Moteus

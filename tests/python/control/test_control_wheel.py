@@ -17,7 +17,8 @@ import pytest
 
 from conftest import ROOT
 from control_program import control, every_row, needs_program
-from hid_wheel import MOST_EFFECTS, TOP, Wheel, emulated_wheel, open_ff_board
+from emulated_device import emulated
+from hid_wheel import MOST_EFFECTS, TOP, Wheel, open_ff_board
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Model, Plan, identify, load_model, plan, read_recording, verify
 from palpate.cli.main import main
@@ -156,7 +157,7 @@ def test_a_planned_spring_is_rendered_recorded_and_identified_again(
     assert found.scheme.line.rule == "constant"
     assert found.refused[0].startswith("direct: viscous damping")
     record = tmp_path / "rendered.csv"
-    with emulated_wheel(node, period_s=PERIOD_S) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S)) as wheel:
         ran = control(
             planned, "--device", name(node), "--wait-ms", 0.5, "--json", "--duration-s", 4, "--record", record
         )
@@ -196,7 +197,7 @@ def test_a_planned_spring_is_rendered_recorded_and_identified_again(
 def test_a_fault_ends_a_certified_run_in_zero_force(
     fault: dict[str, Any], sentence: str, planned: Path, node: Path
 ) -> None:
-    with emulated_wheel(node, period_s=PERIOD_S, **fault) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S, **fault)) as wheel:
         ran = control(planned, "--device", name(node), "--wait-ms", 0.5, "--duration-s", 4)
         assert ran.returncode == 1
         assert sentence in ran.stderr
@@ -209,7 +210,7 @@ def test_a_fault_ends_a_certified_run_in_zero_force(
 
 @needs_program
 def test_a_wheel_that_ignores_reports_ends_its_force_with_the_duration(planned: Path, node: Path) -> None:
-    with emulated_wheel(node, period_s=PERIOD_S, deaf_after=300) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S, deaf_after=300)) as wheel:
         control(planned, "--device", name(node), "--wait-ms", 0.5, "--duration-s", 4)
         assert wheel.torque != 0.0 or wheel.forces == 300
         wheel.step(0.11)
@@ -231,7 +232,7 @@ def test_a_wheel_that_ignores_reports_ends_its_force_with_the_duration(planned: 
 def test_a_wheel_that_cannot_render_is_refused_in_one_sentence(
     changes: dict[str, Any], sentence: str, planned: Path, node: Path
 ) -> None:
-    with emulated_wheel(node, period_s=PERIOD_S, **changes) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S, **changes)) as wheel:
         ran = control(planned, "--device", name(node))
         assert ran.returncode == 2
         assert sentence in ran.stderr
@@ -305,7 +306,7 @@ def test_a_plan_for_another_wheel_is_refused(
     made = plan(spring(), profile(held_line=HeldLine(**loop)))
     assert made.structure == "tangent"
     file = made.stored().save(tmp_path / "planned.json")
-    with emulated_wheel(node, period_s=PERIOD_S) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S)) as wheel:
         ran = control(file, "--device", name(node, springs=device is None))
         assert ran.returncode == 2
         assert sentence in ran.stderr
@@ -319,7 +320,7 @@ def test_a_held_force_needs_no_stiffness(node: Path, tmp_path: Path) -> None:
     record = tmp_path / "held.csv"
     file = soft.save(tmp_path / "soft.json")
     words = ["--uncertified", "--rate-hz", 500, "--wait-ms", 0.5, "--duration-s", 2]
-    with emulated_wheel(node, period_s=PERIOD_S) as wheel:
+    with emulated(node, Wheel(period_s=PERIOD_S)) as wheel:
         ran = control(file, "--device", name(node, springs=False), *words, "--record", record, "--json")
         assert ran.returncode == 0, ran.stderr
         assert 0.1 < wheel.largest_torque < 0.5
@@ -329,7 +330,7 @@ def test_a_held_force_needs_no_stiffness(node: Path, tmp_path: Path) -> None:
 
 
 def test_a_wheel_is_measured_without_being_enabled(node: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with emulated_wheel(node) as wheel:
+    with emulated(node, Wheel()) as wheel:
         code = main(
             [
                 "check-device",

@@ -13,7 +13,7 @@ import pytest
 
 import control_program
 import palpate
-from can_motor import emulated
+from emulated_device import emulated
 from mit_drive import Drive
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile, InputError, Recording

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs an emulated device on a Unix socket, in a test or as a program of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Thread
+from typing import Protocol, TypeVar
+
+
+class Served(Protocol):
+    """Device that answers the messages of one connection."""
+
+    def serve(self, connection: socket.socket) -> None:
+        """Answers the messages of one connection until it is closed."""
+
+
+_Device = TypeVar("_Device", bound=Served)
+
+
+def _listening(path: Path) -> socket.socket:
+    """Returns a listening socket of this name."""
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listening.bind(str(path))
+    listening.listen()
+    return listening
+
+
+@contextlib.contextmanager
+def emulated(path: Path, device: _Device) -> Iterator[_Device]:
+    """Runs a device on a socket of this name as long as the context lasts."""
+
+    def run() -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                device.serve(listening.accept()[0])
+
+    with _listening(path) as listening:
+        Thread(target=run, daemon=True).start()
+        yield device
+        listening.shutdown(socket.SHUT_RDWR)
+
+
+def main(device: Served) -> None:
+    """Runs a device on the socket that the command line names, until the program is ended."""
+    listening = _listening(Path(sys.argv[1]))
+    while True:
+        device.serve(listening.accept()[0])
