@@ -13,7 +13,6 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...recording.motion import noise_band
 from ...verdict import usable
 from ..data.strokes import HysteresisInput, parallel_behind_turns
 from ..decision import Decision, shifted_strokes
@@ -269,13 +268,11 @@ class PlaySearch:
         moving = np.maximum.accumulate(np.where(data.fitted, np.arange(len(data.force)), 0))
         # A tool that waits does not move the play: noise of its position would.
         self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
-        self._noise = noise_band(data.path[:, 0])
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given
-        wavelets is smaller than at its neighbours. A radius within the noise of the position must also have a
-        smaller error than the order of rows.
+        wavelets is smaller than at its neighbours, and than that of the order of rows.
 
         Wavelets that fit the rows after a turn can make a wrong radius the best one. Returns none if the
         motions between gaps of time are too short for every play radius, or never reverse: with one stroke
@@ -293,8 +290,7 @@ class PlaySearch:
             for strokes, before, error, after in zip(
                 self._usable, errors, errors[1:], errors[2:], strict=False
             )
-            if error <= min(before, after)
-            and (error < least or 2.0 * (strokes.play_radius or 0.0) >= self._noise)
+            if error <= min(before, after) and error < least
         ]
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
