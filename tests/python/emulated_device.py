@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs an emulated device on a Unix socket, in a test or as a program of its own."""
+"""Runs an emulated device on a Unix socket, in a test or as a separate program."""
 
 from __future__ import annotations
 
