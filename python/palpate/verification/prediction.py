@@ -69,11 +69,10 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     If model or flight record have a play radius, and the rows are in the order of a motion, the play operator
     follows their positions: near a turn, s = +-1 is not the state that the model was identified with.
     Otherwise s = +-1 is the direction of the recording, or of the order of rows; rows without direction are
-    left out. A memory
-    follows the positions over the time of the recording, from rest. The play radius is the first one
-    available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 % of the
-    travel. A flight record behind a virtual coupling is compared at the position of the virtual object,
-    except a compensated one. A flight record with prediction is compared at the predicted position.
+    left out. A memory follows the positions over the time of the recording, from rest. The play radius is the
+    first one available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 %
+    of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
+    object, except a compensated one. A flight record with prediction is compared at the predicted position.
 
     Raises
     ------

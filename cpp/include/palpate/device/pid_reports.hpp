@@ -24,7 +24,6 @@ inline constexpr std::uint32_t page = 0x0F;  ///< usage page of the class
 enum Usage : std::uint8_t {
     SetEffect = 0x21,
     BlockIndex = 0x22,
-    ParameterOffset = 0x23,
     EffectType = 0x25,
     ConstantForce = 0x26,
     Spring = 0x40,
@@ -39,7 +38,6 @@ enum Usage : std::uint8_t {
     NegativeCoefficient = 0x62,
     PositiveSaturation = 0x63,
     NegativeSaturation = 0x64,
-    DeadBand = 0x65,
     Magnitude = 0x70,
     SetConstant = 0x73,
     EffectOperation = 0x77,
@@ -104,7 +102,6 @@ class Layout {
             refuse("numbered reports");
         }
         axis = found_axis();
-        axis_report = report_of(ReportType::Input, axis.report);
         effect_index = need(ReportType::Output, SetEffect, BlockIndex, "Set Effect report");
         effect = report_of(ReportType::Output, effect_index.report);
         effect_type = need_field(ReportType::Output, SetEffect, EffectType, "effect type in Set Effect");
@@ -237,11 +234,10 @@ class Layout {
     std::optional<Value> effect_gain, direction_enable, direction, loop_count, device_gain, is_paused,
         is_enabled;
     ReportField effect_type, operation_kind, control_kind, create_type, load_status;
-    Report axis_report, effect, constant, operation, control, create, load;
+    Report effect, constant, operation, control, create, load;
     // Of a spring
     Value condition_index, center, positive_coefficient, negative_coefficient, positive_saturation,
         negative_saturation;
-    std::optional<Value> parameter_offset, dead_band;
     Report condition;
 
     /// Returns size and number of a report; its size is 0 if the device does not have it.
@@ -367,8 +363,6 @@ class Layout {
         negative_coefficient = *negative;
         positive_saturation = *above;
         negative_saturation = *below;
-        parameter_offset = value(ParameterOffset);
-        dead_band = value(DeadBand);
     }
 
     Reports reports_;
