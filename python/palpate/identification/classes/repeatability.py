@@ -4,6 +4,7 @@ with one recording left out at a time."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +12,11 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
-from ...recording.conversion import MIN_ROWS
 from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
 from ..data.repeats import Repeats, band_of, pure_error
-from ..network.separable import problem_of
+from ..network.basis import Basis
+from ..network.separable import SeparableProblem, Solution, problem_of
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
-from ..search.growth import Growth
 from .class_selection import ClassSelection
 
 MOST_EXCESS = 1.02
@@ -119,17 +119,17 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
 
 
 FEW_ROWS = 500
-"""Number of rows up to which the model is selected again for the error on left out rows; more rows change its
+"""Number of rows up to which a network is grown again for the error on left out rows; more rows change its
 wavelets little, and only its numbers are fitted again."""
 
 
 def left_out_nrmse(selection: ClassSelection) -> float:
     """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
 
-    A model of few rows is selected again from the other rows. The numbers of another model are fitted again
-    to them by a few steps. Rows with correlated noise are left out together.
+    A network of few rows is grown again on the other rows. The numbers of another model are fitted again to
+    them by a few steps. Rows with correlated noise are left out together.
     """
-    best, growth = selection.best, selection.growth
+    best = selection.best
     data, used = best.data, best.error.weight > 0.0
     force = data.force if best.moving is None else data.force - best.moving.force
     compressor = Compressor(
@@ -139,23 +139,13 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     together = max(1, round(len(rows) / best.problem.independent))
     fold = np.full(len(used), -1)
     fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
-    error = best.error
-    residual = error.residual.copy()
-    single = len(data.names) == 1
-    again_selected = single and len(rows) <= FEW_ROWS and data is selection.data and best.moving is None
+    residual, fit = best.error.residual.copy(), SeparableProblem.solve
+    if len(data.names) == 1:
+        fit = selection.growth.grown_again if len(rows) <= FEW_ROWS else selection.growth.refined
     for number in range(HELD_OUT_EVERY):
-        others = used & (fold != number)
-        if again_selected and np.count_nonzero(others) > MIN_ROWS:
-            given = np.ones(len(used)) if data.weight is None else data.weight
-            other = selection.repeated(replace(data, weight=np.where(others, given, 0.0))).best
-            left = used & (fold == number) & (other.error_on(None).weight > 0.0)
-            residual[left] = other.residual[left]
-        elif others.any():
-            again, left = _left_out(
-                best, compressor, force, others, used & (fold == number), growth if single else None
-            )
-            residual[left] = again[left]
-    return replace(error, residual=residual).nrmse
+        again, left = _left_out(best, compressor, force, used & (fold != number), used & (fold == number), fit)
+        residual[left] = again[left]
+    return replace(best.error, residual=residual).nrmse
 
 
 def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
@@ -178,7 +168,7 @@ def _left_out(
     force: Float1D,
     fitted: NDArray[np.bool_],
     left: NDArray[np.bool_],
-    growth: Growth | None = None,
+    fit: Callable[[SeparableProblem, Basis], Solution] = SeparableProblem.solve,
 ) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
     the positions and directions of these rows.
@@ -197,7 +187,5 @@ def _left_out(
         return force - float(np.mean(force[fitted])), left
     rows = compressor.rows(best.side, fitted)
     problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
-    solution = problem.solve(best.solution.basis)
-    if growth is not None:
-        solution = growth.refined(problem, solution)
+    solution = fit(problem, best.solution.basis)
     return problem.errors(solution, HeldOutRows(np.ascontiguousarray(data.box), force, best.side)), left

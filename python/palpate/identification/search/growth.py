@@ -432,12 +432,15 @@ class Growth:
                     current, value = trial, self._criterion_of(problem, trial)
         return current
 
-    def refined(self, problem: SeparableProblem, solution: Solution) -> Solution:
-        """Returns a solution after as many refinement steps as follow each added wavelet."""
-        if not self._search.refine or not len(solution.basis):
-            return solution
-        steps = self._search.refine_steps
-        return self._refine(problem, solution, steps=steps, tolerance=GROWING_TOLERANCE)
+    def refined(self, problem: SeparableProblem, basis: Basis) -> Solution:
+        """Returns the network with these wavelets, refined by as many steps as follow each added wavelet."""
+        return self._improved(problem, problem.solve(basis), self._search.refine_steps)[1]
+
+    def grown_again(self, problem: SeparableProblem, basis: Basis) -> Solution:
+        """Returns a network that grows as the one with the wavelets `basis` did on other rows."""
+        if not len(basis) or self._criterion in ON_HELD_OUT_ROWS:
+            return self.refined(problem, basis)
+        return self.grow(problem, Basis.empty(problem.dimension), "left out rows").solution
 
     def _improved(
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
