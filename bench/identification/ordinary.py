@@ -136,11 +136,14 @@ def _at_speed(model: Model, position: Array, side: Array, speed: float) -> Array
 
 
 def classes_of(model: Model) -> dict[str, bool]:
-    """Returns the model classes of a model: name -> True if the model has it."""
+    """Returns the model classes of a model: name -> True if the model has it. Branches that slip are
+    hysteresis."""
+    memory = model.memory
     return {
-        "hysteresis": model.hysteretic,
+        "hysteresis": model.hysteretic
+        or (memory is not None and bool(np.isfinite(memory.yield_stretch).any())),
         "velocity": model.of_velocity or model.damping is not None,
-        "memory": model.memory is not None,
+        "memory": memory is not None and bool(np.isfinite(memory.time_constant_s).any()),
         "period": model.period is not None,
     }
 

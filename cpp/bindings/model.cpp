@@ -184,10 +184,12 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
 
 /// Makes the memory of a model from the arguments of its Python constructor.
 MemoryParameters make_memory(const Array& alpha, const Array& beta, const Array& weight, double linear,
-                             double bias, const Array& stiffness, const Array& time_constant_s) {
+                             double bias, const Array& stiffness, const Array& time_constant_s,
+                             const std::optional<Array>& yield_stretch) {
     return {{1, copied(alpha), copied(beta), copied(weight), {linear}, bias},
             copied(stiffness),
-            copied(time_constant_s)};
+            copied(time_constant_s),
+            yield_stretch ? copied(*yield_stretch) : std::vector<double>{}};
 }
 
 /// Throws unless time and position of a motion have the same size, and the time increases.
@@ -383,12 +385,15 @@ py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta
 void bind_model(py::module_& module) {
     py::class_<MemoryParameters> memory(
         module, "Memory",
-        "Memory of a relaxing object: J springs of stiffness k_j in series with dashpots (branches).\n\n"
-        "f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j. The ratio p is a network of one\n"
-        "input with the wavelets alpha, beta, weight, the slope `linear` and the constant `bias`.");
+        "Memory of an object that relaxes or slips: J springs of stiffness k_j in series with a dashpot and\n"
+        "a slider (branches).\n\n"
+        "f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j, |e_j| <= Y_j. The ratio p is a\n"
+        "network of one input with the wavelets alpha, beta, weight, the slope `linear` and the constant\n"
+        "`bias`.");
     memory.def(py::init(&make_memory), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
-               "stiffness"_a, "time_constant_s"_a,
-               "Makes the memory. The model that gets it checks the values.");
+               "stiffness"_a, "time_constant_s"_a, "yield_stretch"_a = py::none(),
+               "Makes the memory; without `yield_stretch` no branch slips. The model that gets it checks the\n"
+               "values.");
     memory.def_property_readonly("alpha", [](const MemoryParameters& m) { return row(m.ratio.alpha); });
     memory.def_property_readonly("beta", [](const MemoryParameters& m) { return row(m.ratio.beta); });
     memory.def_property_readonly("weight", [](const MemoryParameters& m) { return row(m.ratio.weight); });
@@ -399,7 +404,15 @@ void bind_model(py::module_& module) {
         "Stiffness k_j of each branch [N/m or N*m/rad].");
     memory.def_property_readonly(
         "time_constant_s", [](const MemoryParameters& m) { return row(m.time_constant_s); },
-        "Time constant tau_j of each branch [s].");
+        "Time constant tau_j of each branch, infinite if it does not relax [s].");
+    memory.def_property_readonly(
+        "yield_stretch",
+        [](const MemoryParameters& m) {
+            return m.yield_stretch.empty()
+                       ? row(std::vector(m.stiffness.size(), std::numeric_limits<double>::infinity()))
+                       : row(m.yield_stretch);
+        },
+        "Stretch Y_j at which each branch slips, infinite if it does not [m or rad].");
 
     py::class_<ForceModel> type(
         module, "ForceModel",

@@ -71,7 +71,8 @@ inline NetworkParameters with_harmonics(Random& random, NetworkParameters networ
     return network;
 }
 
-/// Returns a memory of one to four branches over [0, 1]. The ratio may have any sign; in half of the cases it is 1.
+/// Returns a memory of one to four branches over [0, 1], some of which slip. The ratio may have any sign; in half of the
+/// cases it is 1.
 inline MemoryParameters random_memory(Random& random) {
     MemoryParameters memory;
     if (random() % 2 == 0) {
@@ -82,6 +83,15 @@ inline MemoryParameters random_memory(Random& random) {
     for (std::size_t j = 0; j < branches; ++j) {
         memory.stiffness.push_back(std::exp(uniform(random, -2.0, 3.0)));
         memory.time_constant_s.push_back(std::exp(uniform(random, -7.0, 3.0)));
+    }
+    if (random() % 2 == 0) {
+        for (std::size_t j = 0; j < branches; ++j) {
+            memory.yield_stretch.push_back(std::exp(uniform(random, -6.0, 0.0)));
+            if (random() % 2 == 0) {
+                (random() % 2 == 0 ? memory.time_constant_s : memory.yield_stretch)[j] =
+                    std::numeric_limits<double>::infinity();
+            }
+        }
     }
     return memory;
 }

@@ -187,13 +187,16 @@ class _Numbers:
 
     def branches(self, memory: ExportedMemory) -> Iterator[str]:
         """Yields the numbers of the branches. Their coordinate has a unit in which the ratio is a force."""
-        yield _define("BRANCHES", len(memory.stiffness), "springs in series with dashpots")
+        yield _define("BRANCHES", len(memory.stiffness), "springs in series with a dashpot and a slider")
         yield _define("CONTACT", int(memory.contact), "1: the branches do not pull the tool")
         yield _define("MOST_FORCE", _double(self.model.force_limit), f"[{self.exported.force_unit}]")
-        yield _define("MOST_STRETCH", _double(memory.largest_stretch), "largest stretch of a branch")
-        yield _define("SUDDEN", _double(memory.sudden), "stiffness of all branches within a tick")
-        yield "/* Stiffness of each branch, and share of its stretch that is left after a tick at rest. */"
-        for name, values in (("stiffness", memory.stiffness), ("kept", memory.kept)):
+        yield "/* Stiffness of each branch, share of its stretch that is left after a tick at rest, largest stretch. */"
+        values_of = {
+            "stiffness": memory.stiffness,
+            "kept": memory.kept,
+            "most_stretch": memory.largest_stretch,
+        }
+        for name, values in values_of.items():
             yield f"static const double NAME_{name}[NAME_BRANCHES] = {{{', '.join(map(_double, values))}}};"
         yield ""
 

@@ -475,21 +475,25 @@ NAME_INLINE double NAME_within(double value, double largest) {
 NAME_INLINE NAME_real NAME_relaxed(NAME_state *s, double position, NAME_rest at, NAME_real *slope) {
     const double rest = NAME_within((double)at.force, NAME_MOST_FORCE);
     const double least = !NAME_CONTACT ? -NAME_MOST_FORCE : rest < 0.0 ? rest : 0.0;
-    double coordinate, moved, unlimited, force, factor, sum;
+    double coordinate, moved, stretch, unlimited, force, factor, sum, stiffness = 0.0;
     int j;
     NAME_integrals(position, 1, &coordinate, &sum);
     moved = coordinate - s->coordinate;
     s->coordinate = coordinate;
     sum = 0.0;
     for (j = 0; j < NAME_BRANCHES; ++j) {
-        s->stretch[j] = NAME_within(NAME_kept[j] * (s->stretch[j] + moved), NAME_MOST_STRETCH);
+        stretch = NAME_kept[j] * (s->stretch[j] + moved);
+        s->stretch[j] = NAME_within(stretch, NAME_most_stretch[j]);
         sum += NAME_stiffness[j] * s->stretch[j];
+        if (stretch <= NAME_most_stretch[j] && stretch >= -NAME_most_stretch[j]) {
+            stiffness += NAME_stiffness[j] * NAME_kept[j]; /* the branch does not slip */
+        }
     }
     unlimited = rest + (double)at.ratio * sum;
     force = unlimited > NAME_MOST_FORCE ? NAME_MOST_FORCE : unlimited < least ? least : unlimited;
     if (!(force < unlimited || force > unlimited)) {
         *slope = (NAME_real)((double)at.slope + (double)at.ratio_slope * sum +
-                             (double)at.ratio * (double)at.ratio * NAME_SUDDEN);
+                             (double)at.ratio * (double)at.ratio * stiffness);
         return (NAME_real)force;
     }
     *slope = NAME_ZERO;

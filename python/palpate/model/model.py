@@ -25,7 +25,7 @@ from ..recording.files import require_file
 from ..verdict import Verdict
 from .band import Band
 from .model_display import frame_of, html_of
-from .model_file import Fit, PathStep, describe, memory_record, terms_of, write_json
+from .model_file import Fit, PathStep, describe, memory_of, memory_record, terms_of, write_json
 
 _HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
@@ -398,7 +398,7 @@ class Model(ForceModel):
             **{name: value for name, value in network.items() if name != "dimension"},
             **domain,
             **continuation,
-            memory=None if memory is None else Memory(**memory),
+            memory=None if memory is None else memory_of(memory),
             slope_bounds=None if bounds is None else (bounds["min"], bounds["max"]),
             fit=Fit(**fit),
             band=None if band is None else Band.from_record(band),

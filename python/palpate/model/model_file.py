@@ -7,6 +7,7 @@ The core reads and checks model files; `model.schema.json` describes them.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,16 +73,33 @@ class Fit:
 
 
 def memory_record(memory: Memory) -> dict[str, Any]:
-    """Returns the memory of a model for a model file."""
-    return {
+    """Returns the memory of a model for a model file; a branch that does not relax, or does not slip, has
+    None."""
+    record = {
         "alpha": memory.alpha.tolist(),
         "beta": memory.beta.tolist(),
         "weight": memory.weight.tolist(),
         "linear": memory.linear,
         "bias": memory.bias,
         "stiffness": memory.stiffness.tolist(),
-        "time_constant_s": memory.time_constant_s.tolist(),
+        "time_constant_s": _finite(memory.time_constant_s),
     }
+    if np.isfinite(memory.yield_stretch).any():
+        record["yield_stretch"] = _finite(memory.yield_stretch)
+    return record
+
+
+def _finite(values: Float1D) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def memory_of(record: Mapping[str, Any]) -> Memory:
+    """Returns the memory of a record of :func:`memory_record`."""
+    given = dict(record)
+    for name in ("time_constant_s", "yield_stretch"):
+        if name in given:
+            given[name] = [math.inf if value is None else value for value in given[name]]
+    return Memory(**given)
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -206,12 +224,19 @@ def _terms(model: Model, force: str) -> list[str]:
     hysteretic = model.weight_hysteresis is not None and model.linear_hysteresis is not None
     if model.memory is not None:
         ratio = f"sum of {len(model.memory.weight)} wavelets " if len(model.memory.weight) else ""
-        pairs = zip(model.memory.stiffness, model.memory.time_constant_s, strict=True)
+        branches = zip(
+            model.memory.stiffness, model.memory.time_constant_s, model.memory.yield_stretch, strict=True
+        )
         formula = [
-            f"  f(x, t) = g(x) + p(x) sum_j k_j e_j{unit}, de_j/dt = p(x) dx/dt - e_j / tau_j",
+            f"  f(x, t) = g(x) + p(x) sum_j k_j e_j{unit}, de_j/dt = p(x) dx/dt - e_j / tau_j, |e_j| <= Y_j",
             f"  g(x) = {network}{linear}{model.bias:+.6g}",
             f"  p(x) = {ratio}{model.memory.linear:+.6g} x {model.memory.bias:+.6g}",
-            *(f"  branch {j}: k = {k:.6g}, tau = {tau:.6g} s" for j, (k, tau) in enumerate(pairs)),
+            *(
+                f"  branch {j}: k = {k:.6g}"
+                + (f", tau = {tau:.6g} s" if math.isfinite(tau) else "")
+                + (f", Y = {most:.6g}" if math.isfinite(most) else "")
+                for j, (k, tau, most) in enumerate(branches)
+            ),
         ]
     elif not hysteretic:
         formula = [f"  f(x) = {network}{linear}{model.bias:+.6g}{unit}"]

@@ -252,6 +252,11 @@ class Recording:
             return None
         return float(np.median(np.diff(self.time)))
 
+    @property
+    def time_or_row(self) -> Float1D:
+        """Time of each row [s], or its number without time: enough for a force that depends on order alone."""
+        return np.arange(len(self), dtype=float) if self.time is None else self.time
+
     def split(self, every: int = 5) -> tuple[Recording, Recording]:
         """Holds out every `every`-th row; returns (train, test).
 

@@ -183,9 +183,10 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
 
 def _relaxing(model: Model, recording: Recording) -> Float1D:
     """Returns the force (n,) of a model with memory over the time of a recording."""
-    if recording.time is None:
+    relaxes = model.memory is not None and np.isfinite(model.memory.time_constant_s).any()
+    if recording.time is None and relaxes:
         raise InputError("the recording has no time, which the memory of the model needs: give --time NAME")
-    return model.force_over_time(recording.time, recording.position)[0]
+    return model.force_over_time(recording.time_or_row, recording.position)[0]
 
 
 @dataclass(frozen=True)

@@ -396,19 +396,19 @@ TEST(ForceBounds, OfAMemoryAreSumsOverItsBranches) {
     MemoryParameters memory;
     memory.stiffness = {4.0, 10.0};
     memory.time_constant_s = {0.5, 0.02};
-    memory.ratio = {1, {}, {}, {}, {-2.0}, 3.0};  // 3 - 2 x: 3 to 1
+    memory.yield_stretch = {0.25, 50.0};           // the second branch never slips
+    memory.ratio = {1, {}, {}, {}, {-2.0}, 3.0};  // 3 - 2 x: 3 to 1, with an integral of 2
     const NetworkParameters spring{1, {}, {}, {}, {0.5}, 0.0};
     const ForceModel plain{spring, test::unit_domain()};
     const ForceModel model = plain.with_memory(memory);
     const MemoryNetwork& network = *model.memory();
     const MemoryBounds bounds = *memory_bounds(model);
     const double P = network.largest_ratio();
-    const double U = network.largest_stretch();
     const double slope = network.steepest_ratio();
     EXPECT_NEAR(P, 3.0, 0.05);
     EXPECT_NEAR(slope, 2.0, 0.05);
     EXPECT_NEAR(bounds.stiffness, P * P * 14.0, 1e-12);
-    EXPECT_NEAR(bounds.bending, U * slope * 14.0, 1e-12);
+    EXPECT_NEAR(bounds.bending, slope * (4.0 * 0.25 + 10.0 * 2.0), 0.5);
     EXPECT_NEAR(bounds.bending_per_m, P * slope * 14.0, 1e-12);
     EXPECT_NEAR(bounds.relaxation_per_s, P * P * (4.0 / 0.5 + 10.0 / 0.02), 1e-9);
     EXPECT_FALSE(memory_bounds(plain).has_value());

@@ -151,3 +151,34 @@ def test_wrong_memory_is_refused_with_its_field() -> None:
     )
     with pytest.raises(ValueError, match=r"stiffness\[0\] is -1"):
         relaxing_by_hand(memory=wrong)
+
+
+def slipping_by_hand(**changes: list[float]) -> palpate.Model:
+    """Returns the spring with a branch that slips from a stretch of 0.1 m on, and one that relaxes."""
+    branches = {"stiffness": [3.0, 1.0], "time_constant_s": [np.inf, 0.5], "yield_stretch": [0.1, np.inf]}
+    ratio = {"alpha": [], "beta": [], "weight": [], "linear": 0.0, "bias": 1.0}
+    return relaxing_by_hand(memory=Memory(**ratio, **branches | changes))
+
+
+def test_a_branch_that_slips_comes_back_from_its_file(tmp_path: Path) -> None:
+    model = slipping_by_hand()
+    model.save(tmp_path / "slips.json")
+    assert '"yield_stretch": [0.1, null]' in (tmp_path / "slips.json").read_text()
+    read = palpate.load_model(tmp_path / "slips.json")
+    assert read == model
+    assert read.memory is not None
+    assert read.memory.yield_stretch.tolist() == [0.1, np.inf]
+    assert read.memory.time_constant_s.tolist() == [np.inf, 0.5]
+    assert "branch 0: k = 3, Y = 0.1\n" in str(read)
+    assert str(read).endswith("branch 1: k = 1, tau = 0.5 s")
+
+
+def test_a_memory_that_only_slips_needs_no_time() -> None:
+    x = np.linspace(0.0, 0.5, 200)
+    slips = slipping_by_hand(stiffness=[3.0], time_constant_s=[np.inf], yield_stretch=[0.1])
+    recording = palpate.Recording.from_arrays(
+        x, 2.0 * x + 3.0 * np.minimum(x, 0.1), units={"position": "m", "force": "N"}
+    )
+    assert palpate.verify(slips, recording).nrmse < 1e-12
+    with pytest.raises(InputError, match="the recording has no time, which the memory of the model needs"):
+        palpate.verify(slipping_by_hand(), recording)

@@ -94,6 +94,9 @@ class NumberHash {
         hash.add(parameters.ratio.bias);
         hash.add(parameters.stiffness);
         hash.add(parameters.time_constant_s);
+        if (!parameters.yield_stretch.empty()) {
+            hash.add(parameters.yield_stretch);
+        }
     }
     if (model.units() != ModelUnits{}) {
         hash.add(model.units().position);

@@ -25,6 +25,12 @@ struct MemoryParameters {
     NetworkParameters ratio{.linear = {0.0}, .bias = 1.0};  ///< p, change of the coordinate by position [-]
     std::vector<double> stiffness;                          ///< stiffness k_j of each branch, >= 0 [N/m]
     std::vector<double> time_constant_s;                    ///< time constant tau_j of each branch, > 0 [s]
+    std::vector<double> yield_stretch{};                    ///< stretch Y_j at which each branch slips, > 0 [m]; or none
+
+    /// Returns the yield stretch Y_j of a branch [m]; infinite if no branch slips.
+    [[nodiscard]] double yield_at(std::size_t j) const noexcept {
+        return yield_stretch.empty() ? std::numeric_limits<double>::infinity() : yield_stretch[j];
+    }
 };
 
 /// Throws std::invalid_argument if a parameter of a memory is invalid. The message states its name and the rule.
@@ -36,26 +42,37 @@ inline void validate(const MemoryParameters& memory, const Domain& domain) {
         n >= 1 && n <= most_branches,
         "stiffness has " + std::to_string(n) + " values, must have 1 to " + std::to_string(most_branches));
     detail::require_size(memory.time_constant_s, n, "time_constant_s");
+    if (!memory.yield_stretch.empty()) {
+        detail::require_size(memory.yield_stretch, n, "yield_stretch");
+    }
+    const auto require_positive = [](const std::vector<double>& values, const char* name) {
+        for (std::size_t j = 0; j < values.size(); ++j) {
+            detail::require(values[j] > 0.0, std::string(name) + "[" + std::to_string(j) + "] is " +
+                                                 std::to_string(values[j]) + ", must be > 0");
+        }
+    };
+    require_positive(memory.time_constant_s, "time_constant_s");
+    require_positive(memory.yield_stretch, "yield_stretch");
     for (std::size_t j = 0; j < n; ++j) {
         const double k = memory.stiffness[j];
-        const double tau = memory.time_constant_s[j];
         detail::require(k >= 0.0 && std::isfinite(k),
                         "stiffness[" + std::to_string(j) + "] is " + std::to_string(k) + ", must be >= 0");
-        detail::require(tau > 0.0 && std::isfinite(tau), "time_constant_s[" + std::to_string(j) + "] is " +
-                                                             std::to_string(tau) + ", must be > 0");
     }
     detail::require(!domain.period, "period is set, but a force with memory cannot be periodic");
 }
 
-/// Memory of a relaxing object: springs in series with dashpots (branches), in parallel with the force at rest g.
+/// Memory of an object that relaxes or slips: springs in series with a dashpot and a slider (branches), in parallel with
+/// the force at rest g.
 ///
-/// The coordinate u with du/dx = p(x) moves one end of each branch, the dashpot moves the other end z_j:
+/// The coordinate u with du/dx = p(x) moves one end of each branch. The dashpot moves the other end z_j, and the slider
+/// moves it as far as |e_j| would exceed the yield stretch Y_j:
 ///
-///     f = g(x) + p(x) sum_j k_j e_j,   e_j = u - z_j,   dz_j/dt = e_j / tau_j.
+///     f = g(x) + p(x) sum_j k_j e_j,   e_j = u - z_j,   dz_j/dt = e_j / tau_j,   |e_j| <= Y_j.
 ///
-/// The ratio p makes an object relax by other forces at other positions. The object stores the energy
-/// G(x) + sum_j k_j e_j^2 / 2 and dissipates the power sum_j k_j e_j^2 / tau_j >= 0 (G is the antiderivative of g), so
-/// no closed motion generates energy, for any p.
+/// Branches that only slip (tau_j infinite) are those of Masing and Iwan: loops whose width grows with their length. The
+/// ratio p gives an object other forces of the branches at other positions. The object stores the energy
+/// G(x) + sum_j k_j e_j^2 / 2 and dissipates the power sum_j k_j e_j dz_j/dt >= 0 (G is the antiderivative of g), so no
+/// closed motion generates energy, for any p.
 class MemoryNetwork {
   public:
     /// Makes the memory of a model with the force at rest `force`. Outside the domain, p is constant, or with a free
@@ -100,12 +117,26 @@ class MemoryNetwork {
     /// Return bounds of |p| and |dp/dx| over all positions.
     [[nodiscard]] double largest_ratio() const noexcept { return largest_ratio_; }
     [[nodiscard]] double steepest_ratio() const noexcept { return steepest_ratio_; }
-    /// Returns U, the largest stretch |e_j| [m]: the coordinate's range over the domain. A motion outside the domain
-    /// does not stretch a branch further.
-    [[nodiscard]] double largest_stretch() const noexcept { return largest_stretch_; }
-    /// Returns the largest energy that the branches store, sum_j k_j U^2 / 2 [J].
+    /// Returns the largest stretch of branch j [m], min(U, Y_j) with the coordinate's range U over the domain: a motion
+    /// outside the domain does not stretch a branch further.
+    [[nodiscard]] double largest_stretch(std::size_t j) const noexcept {
+        return std::min(largest_stretch_, parameters_.yield_at(j));
+    }
+    /// Returns the largest force of the branches along their coordinate, sum_j k_j min(U, Y_j) [N].
+    [[nodiscard]] double largest_tension() const noexcept {
+        double sum = 0.0;
+        for (std::size_t j = 0; j < parameters_.stiffness.size(); ++j) {
+            sum += parameters_.stiffness[j] * largest_stretch(j);
+        }
+        return sum;
+    }
+    /// Returns the largest energy that the branches store, sum_j k_j min(U, Y_j)^2 / 2 [J].
     [[nodiscard]] double largest_energy() const noexcept {
-        return 0.5 * stiffness() * largest_stretch_ * largest_stretch_;
+        double sum = 0.0;
+        for (std::size_t j = 0; j < parameters_.stiffness.size(); ++j) {
+            sum += 0.5 * parameters_.stiffness[j] * largest_stretch(j) * largest_stretch(j);
+        }
+        return sum;
     }
     /// Returns the smallest width of a wavelet of the ratio, at most `travel` [m].
     [[nodiscard]] double finest_width(double travel) const noexcept {
@@ -136,7 +167,7 @@ struct BranchStep {
 /// A force with memory that is computed once in each period. `C` is the type of the curves: `NetworkCurve` or
 /// `CompiledCurve`.
 ///
-/// The branches use the backward Euler method, e_j <- (e_j + du) / (1 + T / tau_j), which needs no iteration. If the
+/// The branches use the backward Euler method, e_j <- (e_j + du) / (1 + T / tau_j), limited to Y_j, without iteration. If the
 /// force would exceed the force limit, or would pull a tool that can leave the object, all stretches are multiplied by
 /// one factor from 0 to 1, so that the force is at this limit. The stored energy then only decreases.
 template <class C>
@@ -154,13 +185,12 @@ class MemoryForce {
           ratio_{std::move(ratio)},
           branches_{memory.parameters().stiffness.size()},
           contact_{memory.contact()},
-          force_limit_{force_limit},
-          largest_stretch_{memory.largest_stretch()} {
+          force_limit_{force_limit} {
         for (std::size_t j = 0; j < branches_; ++j) {
             stiffness_[j] = memory.parameters().stiffness[j];
             time_constant_s_[j] = memory.parameters().time_constant_s[j];
+            largest_stretch_[j] = memory.largest_stretch(j);
             kept_[j] = 1.0 / (1.0 + period_s / time_constant_s_[j]);
-            sudden_stiffness_ += stiffness_[j] * kept_[j];
         }
     }
 
@@ -179,12 +209,11 @@ class MemoryForce {
         const Curve p = ratio_.at(x);
         const double moved = p.integral - state.coordinate;
         state.coordinate = p.integral;
-        double force = 0.0;
+        Sum sum;
         for (std::size_t j = 0; j < branches_; ++j) {
-            state.stretch[j] = limited(kept_[j] * (state.stretch[j] + moved));
-            force += stiffness_[j] * state.stretch[j];
+            stretch(j, kept_[j] * (state.stretch[j] + moved), kept_[j], state, sum);
         }
-        return relaxed(x, p, force, sudden_stiffness_, state).sample;
+        return relaxed(x, p, sum, state).sample;
     }
 
     /// Force of the recorded motion at one row, and the factor by which the stretches were reduced [-].
@@ -199,30 +228,37 @@ class MemoryForce {
         const Curve p = ratio_.at(x);
         const double moved = p.integral - state.coordinate;
         state.coordinate = p.integral;
-        double force = 0.0;
-        double stiffness = 0.0;
+        Sum sum;
         for (std::size_t j = 0; j < branches_; ++j) {
             const BranchStep share{seconds, time_constant_s_[j]};
-            state.stretch[j] = limited(share.kept * state.stretch[j] + share.moved * moved);
-            force += stiffness_[j] * state.stretch[j];
-            stiffness += stiffness_[j] * share.moved;
+            stretch(j, share.kept * state.stretch[j] + share.moved * moved, share.moved, state, sum);
         }
-        return relaxed(x, p, force, stiffness, state);
+        return relaxed(x, p, sum, state);
     }
 
   private:
-    [[nodiscard]] double limited(double stretch) const noexcept {
-        return std::clamp(stretch, -largest_stretch_, largest_stretch_);
+    /// Sum of the forces of the branches along u, and of their stiffnesses along u.
+    struct Sum {
+        double force = 0.0;
+        double stiffness = 0.0;
+    };
+
+    /// Sets the stretch of branch j, limited, and adds its force to `sum`; `share` of a motion stretches it until it
+    /// slips.
+    void stretch(std::size_t j, double free, double share, State& state, Sum& sum) const noexcept {
+        state.stretch[j] = std::clamp(free, -largest_stretch_[j], largest_stretch_[j]);
+        sum.force += stiffness_[j] * state.stretch[j];
+        sum.stiffness += std::abs(free) > largest_stretch_[j] ? 0.0 : stiffness_[j] * share;
     }
 
-    /// Returns force, slope and energy for the sum `force` of the branches' forces along u, and reduces the stretches
-    /// if the force is outside its limits.
-    Recorded relaxed(double x, const Curve& p, double force, double stiffness, State& state) const noexcept {
+    /// Returns force, slope and energy for the sum of the branches, and reduces the stretches if the force is outside
+    /// its limits.
+    Recorded relaxed(double x, const Curve& p, const Sum& sum, State& state) const noexcept {
         const Curve g = force_.at(x);
         const double rest = std::clamp(g.value, -force_limit_, force_limit_);
         const double least = contact_ ? std::min(rest, 0.0) : -force_limit_;
-        const double unlimited = rest + p.value * force;
-        Recorded result{{unlimited, g.slope + p.slope * force + p.value * p.value * stiffness, g.integral,
+        const double unlimited = rest + p.value * sum.force;
+        Recorded result{{unlimited, g.slope + p.slope * sum.force + p.value * p.value * sum.stiffness, g.integral,
                          force_.extrapolated(x)},
                         1.0};
         const double limit = std::clamp(unlimited, least, force_limit_);
@@ -245,12 +281,11 @@ class MemoryForce {
     std::array<double, most_branches> stiffness_{};
     std::array<double, most_branches> time_constant_s_{};
     std::array<double, most_branches>
-        kept_{};                     ///< share of a stretch that is left after a period at rest [-]
-    double sudden_stiffness_ = 0.0;  ///< slope of the branches for a motion within one period [N/m]
+        kept_{};  ///< share of a stretch that is left after a period at rest [-]
     std::size_t branches_;
     bool contact_;
     double force_limit_;
-    double largest_stretch_;
+    std::array<double, most_branches> largest_stretch_{};
 };
 
 static_assert(Environment<MemoryForce<NetworkCurve>>);

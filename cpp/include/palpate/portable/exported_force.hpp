@@ -174,10 +174,13 @@ class ExportedForce {
         const double moved = coordinate - state.coordinate;
         state.coordinate = coordinate;
         sum = 0.0;
+        double stiffness = 0.0;
         for (std::size_t j = 0; j < memory.stiffness.size(); ++j) {
             const double stretch = memory.kept[j] * (state.stretch[j] + moved);
-            state.stretch[j] = std::clamp(stretch, -memory.largest_stretch, memory.largest_stretch);
+            state.stretch[j] = std::clamp(stretch, -memory.largest_stretch[j], memory.largest_stretch[j]);
             sum += memory.stiffness[j] * state.stretch[j];
+            stiffness +=
+                std::abs(stretch) > memory.largest_stretch[j] ? 0.0 : memory.stiffness[j] * memory.kept[j];
         }
         const double ratio = static_cast<double>(p.force);
         const double rest = std::clamp(static_cast<double>(g.force), -limit, limit);
@@ -186,7 +189,7 @@ class ExportedForce {
         const double force = std::clamp(unlimited, least, limit);
         if (force == unlimited) {
             const double slope = static_cast<double>(g.slope) + static_cast<double>(p.slope) * sum +
-                                 ratio * ratio * memory.sudden;
+                                 ratio * ratio * stiffness;
             return {static_cast<Real>(force), static_cast<Real>(slope)};
         }
         const double factor = std::clamp((force - rest) / (unlimited - rest), 0.0, 1.0);

@@ -55,7 +55,7 @@ struct ExportedLag {
 struct ExportedMemory {
     std::vector<double> stiffness;  ///< k_j of each branch
     std::vector<double> kept;       ///< share of a stretch that is left after a period at rest [-]
-    double largest_stretch = 0.0;   ///< bound of |e_j|
+    std::vector<double> largest_stretch;  ///< bound of |e_j|
     double sudden = 0.0;            ///< sum of the stiffnesses for a motion within one period
     bool contact = false;           ///< true if the branches do not pull the tool
 };
@@ -186,7 +186,7 @@ class ExportedModel {
         if (given.memory() == nullptr) {
             return given;
         }
-        const double unit = given.memory()->stiffness() * given.memory()->largest_stretch();
+        const double unit = given.memory()->largest_tension();
         if (!(unit > 0.0 && std::isfinite(unit))) {
             return given;
         }
@@ -199,6 +199,9 @@ class ExportedModel {
         for (double& stiffness : scaled.stiffness) {
             stiffness /= unit * unit;
         }
+        for (double& stretch : scaled.yield_stretch) {
+            stretch *= unit;
+        }
         return given.with_memory(std::move(scaled));
     }
 
@@ -207,9 +210,9 @@ class ExportedModel {
         if (memory == nullptr) {
             return std::nullopt;
         }
-        ExportedMemory made{
-            memory->parameters().stiffness, {}, memory->largest_stretch(), 0.0, memory->contact()};
+        ExportedMemory made{memory->parameters().stiffness, {}, {}, 0.0, memory->contact()};
         for (std::size_t j = 0; j < made.stiffness.size(); ++j) {
+            made.largest_stretch.push_back(memory->largest_stretch(j));
             made.kept.push_back(1.0 / (1.0 + target_.period_s / memory->parameters().time_constant_s[j]));
             made.sudden += made.stiffness[j] * made.kept[j];
         }
@@ -314,12 +317,15 @@ class ExportedModel {
         const CurveErrors& p = law_.errors()[1];
         const ExportedMemory& memory = *memory_;
         double stiffness = 0.0;
-        for (const double k : memory.stiffness) {
-            stiffness += k;
+        double sum = 0.0;
+        double farthest = 0.0;
+        for (std::size_t j = 0; j < memory.stiffness.size(); ++j) {
+            stiffness += memory.stiffness[j];
+            sum += memory.stiffness[j] * memory.largest_stretch[j];
+            farthest = std::max(farthest, memory.largest_stretch[j]);
         }
-        const double size = largest_integral(1) + memory.largest_stretch;
+        const double size = largest_integral(1) + farthest;
         const double of_stretch = 2.0 * (p.integral + 64.0 * 0x1p-53 * size);
-        const double sum = stiffness * memory.largest_stretch;
         force_error_ +=
             p.value * sum + p.largest * stiffness * of_stretch + 4.0 * u * (g.largest + p.largest);
         slope_error_ += p.slope * sum + p.steepest * stiffness * of_stretch +
@@ -328,8 +334,8 @@ class ExportedModel {
         // The coordinate grows with the distance from the domain
         rendering_error_ =
             128.0 * 0x1p-53 * p.largest * p.largest * stiffness * 0x1p31 * target_.encoder_step;
-        const double energy = 0.5 * sum * memory.largest_stretch;
-        energy_error_ += stiffness * (memory.largest_stretch + 0.5 * of_stretch) * of_stretch;
+        const double energy = 0.5 * sum * farthest;
+        energy_error_ += (sum + 0.5 * stiffness * of_stretch) * of_stretch;
         return energy;
     }
 

@@ -54,7 +54,7 @@ inline constexpr double force_reserve = 1.05;
         }
     }
     if (const MemoryNetwork* memory = model.memory()) {
-        largest += memory->stiffness() * memory->largest_ratio() * memory->largest_stretch();
+        largest += memory->largest_ratio() * memory->largest_tension();
     }
     return largest > 0.0 ? largest : 1.0;
 }

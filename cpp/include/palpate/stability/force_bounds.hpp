@@ -20,11 +20,11 @@
 namespace palpate {
 
 /// Bounds of a memory over all positions: branches of stiffness k_j and time constant tau_j, ratio p with |p| <= P and
-/// |p'| <= P', stretches |e_j| <= U.
+/// |p'| <= P', stretches |e_j| <= U_j, the smaller one of the range of the coordinate and the yield stretch.
 struct MemoryBounds {
     double stiffness = 0.0;      ///< P^2 sum_j k_j, the largest stiffness of the branches [N/m]
-    double bending = 0.0;        ///< U P' sum_j k_j, the largest slope by a change of the ratio [N/m]
-    double bending_per_m = 0.0;  ///< P P' sum_j k_j, increase of `bending` for each metre of U [N/m^2]
+    double bending = 0.0;        ///< P' sum_j k_j U_j, the largest slope by a change of the ratio [N/m]
+    double bending_per_m = 0.0;  ///< P P' sum_j k_j, largest increase of `bending` for each metre of U_j [N/m^2]
     double relaxation_per_s =
         0.0;  ///< P^2 sum_j k_j / tau_j, largest decrease of the stiffness by time [N/(m*s)]
 };
@@ -248,7 +248,7 @@ struct SlopeReading {
     for (std::size_t j = 0; j < memory->parameters().stiffness.size(); ++j) {
         const double k = memory->parameters().stiffness[j];
         bounds.stiffness += ratio * ratio * k;
-        bounds.bending += memory->largest_stretch() * memory->steepest_ratio() * k;
+        bounds.bending += memory->largest_stretch(j) * memory->steepest_ratio() * k;
         bounds.bending_per_m += ratio * memory->steepest_ratio() * k;
         bounds.relaxation_per_s += ratio * ratio * k / memory->parameters().time_constant_s[j];
     }

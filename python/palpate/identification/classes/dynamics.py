@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION, LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.rows import Rows, modulo
+from ..data.strokes import HysteresisInput
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions
-from ..search.evidence import CRITERIA, CRITERION_NAMES, ON_HELD_OUT_ROWS, Moving
+from ..search.evidence import CRITERIA, CRITERION_NAMES, LEAST_GAIN, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
 """Number of sections of the recording for a test of damping and mass; each section is held out once."""
@@ -114,6 +115,9 @@ SHORT_MOTION = "the motion of the recording between gaps of time is too short or
 """Text of the decision that damping and mass are not tested, if the recorded motion is too short or too
 noisy."""
 
+LEAST_SHARE = 1e-9
+"""Least weight of a row before the low-pass filter [-]."""
+
 SMOOTHING_SPEED_SHARE = 0.1
 """Speed v0 of the smoothed sign tanh(v/v0) of a velocity v [share of the RMS speed]."""
 
@@ -142,7 +146,9 @@ class Dynamics:
         self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
-    def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[Decision]]:
+    def accepted(
+        self, basis: Basis, strokes: HysteresisInput | None
+    ) -> tuple[dict[str, float], list[Decision]]:
         """Returns accepted values of damping and mass for given wavelets of the force, and the decisions on
         both.
 
@@ -150,10 +156,10 @@ class Dynamics:
         ----------
         basis : Basis
             Wavelets in the unit box.
-        side : (n,), optional
-            Direction state of each row; None without hysteresis.
+        strokes : HysteresisInput, optional
+            Direction state and weight of each row; None without hysteresis.
         """
-        regression = self._regression(basis, side)
+        regression = self._regression(basis, strokes)
         if regression is None:
             return {}, [Decision(name, "not tested", SHORT_MOTION) for name in TERMS]
         decisions: list[Decision] = []
@@ -168,7 +174,7 @@ class Dynamics:
         criterion = self._criterion
         valued = {
             (use, names): regression.value(use, names, criterion) + self._evidence * (len(names) + use)
-            for use in ((False, True) if side is not None else (False,))
+            for use in ((False, True) if strokes is not None else (False,))
             for size in range(len(allowed) + 1)
             for names in combinations(allowed, size)
         }
@@ -185,11 +191,11 @@ class Dynamics:
             share, error = regression.held_out_gain(use, without, with_it)
             found = regression.solved(use, with_it)[name]
             measured = squared_error_change(share, error, "held-out sections")
-            if share > error and found > 0.0:
+            if share - error >= LEAST_GAIN and found > 0.0:
                 decisions.append(decided(name, True, f"{measured}, {change}"))
                 continue
             names = tuple(other for other in names if other != name)
-            reason = f"{measured}, must lower it by more than {100 * error:.2g} %"
+            reason = f"{measured}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
             if not found > 0.0:
                 reason = f"the fitted {name} is {found:.4g} {self._unit_of(name)}, a passive object has > 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
@@ -202,11 +208,11 @@ class Dynamics:
             return ""
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
 
-    def values(self, basis: Basis, side: Float1D | None, names: Sequence[str]) -> dict[str, float]:
+    def values(self, basis: Basis, strokes: HysteresisInput | None, names: Sequence[str]) -> dict[str, float]:
         """Returns the fitted mass or damping for given wavelets of the force; empty if the motion is too
         short."""
-        regression = self._regression(basis, side)
-        return {} if regression is None else regression.solved(side is not None, names)
+        regression = self._regression(basis, strokes)
+        return {} if regression is None else regression.solved(strokes is not None, names)
 
     def moving(self, values: dict[str, float]) -> Moving:
         """Returns given mass m and damping B with their force m L a + B L v at every row, with acceleration
@@ -260,7 +266,7 @@ class Dynamics:
         first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
         return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))
 
-    def _regression(self, basis: Basis, side: Float1D | None) -> FoldedRegression | None:
+    def _regression(self, basis: Basis, strokes: HysteresisInput | None) -> FoldedRegression | None:
         tables, folds = [], []
         rows = sum(len(fixed) for fixed in self._fixed)
         done = 0
@@ -271,10 +277,13 @@ class Dynamics:
                 [np.ones((len(box), 1)), box[:, None], basis.columns(box[:, None])],
                 axis=1,
             )
-            if side is not None:
-                here = np.clip(part.on_grid(side[part.rows]), -1.0, 1.0)
+            root = np.ones((len(fixed), 1))
+            if strokes is not None:
+                here = np.clip(part.on_grid(strokes.side[part.rows]), -1.0, 1.0)
                 plain = np.concatenate([plain, here[:, None] * plain], axis=1)
-            tables.append(np.concatenate([fixed, self._filtered(part, plain)], axis=1))
+                variance = 1.0 / np.maximum(part.on_grid(strokes.share[part.rows]), LEAST_SHARE)
+                root = 1.0 / np.sqrt(np.maximum(self._filtered(part, variance[:, None]), 1.0))
+            tables.append(root * np.concatenate([fixed, self._filtered(part, plain)], axis=1))
             folds.append((np.arange(done, done + len(fixed)) * FOLDS) // rows)
             done += len(fixed)
         if not tables:
@@ -285,7 +294,7 @@ class Dynamics:
         forces = np.concatenate([part.force for part in self._parts])
         least = (FORCE_RESOLUTION * float(np.ptp(forces))) ** 2
         return FoldedRegression(
-            np.concatenate(tables), np.concatenate(folds), independent, side is not None, least
+            np.concatenate(tables), np.concatenate(folds), independent, strokes is not None, least
         )
 
     def _filtered(self, part: Piece, columns: Float2D) -> Float2D:

@@ -13,8 +13,9 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
-from ..data.strokes import HysteresisInput, parallel_behind_turns
+from ..data.strokes import FAR, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
 from ..decision import Decision, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
@@ -43,6 +44,9 @@ RADIUS_TOLERANCE = 1e-3
 RADIUS_SEARCH_RATIO = 2.0
 """A search tries play radii between the best radius so far divided by this ratio and that radius times this
 ratio [-]."""
+
+REWEIGHTINGS = 5
+"""Number of fits of given wavelets, each with the weights that follow from the one before; they settle sooner."""
 
 MOST_ROWS = 100_000
 """Largest number of rows for the comparison of two play radii; of more rows an evenly spread part is used."""
@@ -85,12 +89,8 @@ class Hysteresis(ModelClass):
             # The direction can also change at once at a turn. Wavelets of strokes without their reversals
             # show the radius; those of all rows would fit the reversals.
             order = HysteresisInput(data.order, data.order != 0.0)
-            settled = replace(
-                data, force=parallel_behind_turns(data.path[:, 0], data.force, data.order * data.fitted)
-            )
-            samples = Samples(settled, selection.options, selection.cells)
-            basis = self._free(below, order, samples=samples).solution.basis
-            best = self._free(below, order, first=basis)
+            basis = self._free(below, self._weighted(order, below.solution.basis, FAR)).solution.basis
+            best = self._free(below, order)
         for strokes in play.best_of_options(basis):
             found = self._free(below, strokes, play, first=basis)
             best = found if best is None or self._fits_better(found, best) else best
@@ -121,7 +121,6 @@ class Hysteresis(ModelClass):
         below: Candidate,
         strokes: HysteresisInput,
         play: PlaySearch | None = None,
-        samples: Samples | None = None,
         first: Basis | None = None,
     ) -> Candidate:
         """Returns a network with hysteresis, without constraints, for given direction states, or for those of
@@ -133,13 +132,14 @@ class Hysteresis(ModelClass):
         network with hysteresis is grown.
         """
         selection, judge = self._selection, self._selection.judge
-        samples, first = samples or selection.samples, below.solution.basis if first is None else first
-        rows = samples.rows(strokes)
-        problem = samples.problem(rows, strokes)
+        first = below.solution.basis if first is None else first
+        strokes = self._weighted(strokes, first)
+        rows = selection.samples.rows(strokes)
+        problem = selection.samples.problem(rows, strokes)
         start = problem.solve(first)
         free = selection.candidate(self.name, problem, start, judge.criterion, rows=rows, strokes=strokes)
         if self._named or judge.fall(below, free) > 0.0:
-            return self._grown(below, free, samples, play)
+            return self._grown(below, free, play)
         return free
 
     def _chosen(self, below: Candidate, free: Candidate) -> Candidate:
@@ -163,9 +163,7 @@ class Hysteresis(ModelClass):
         self._report_sign(best, kept, free)
         return best
 
-    def _grown(
-        self, below: Candidate, found: Candidate, samples: Samples, play: PlaySearch | None
-    ) -> Candidate:
+    def _grown(self, below: Candidate, found: Candidate, play: PlaySearch | None) -> Candidate:
         """Returns a network with hysteresis; its play radius is searched if hysteresis is accepted or the
         options name it.
 
@@ -174,14 +172,14 @@ class Hysteresis(ModelClass):
         wavelets, and the radius is searched again each time the allowed number of wavelets doubles.
         """
         assert found.strokes is not None
-        selection, most = self._selection, self._selection.options.max_wavelets
-        strokes = found.strokes
+        selection, samples = self._selection, self._selection.samples
+        strokes, most = found.strokes, selection.options.max_wavelets
         basis = selection.start_basis.get(self.name, found.solution.basis)
         has_start, complete = self.name in selection.start_basis, False
         for _ in range(MOST_RADIUS_SEARCHES):
             before = strokes
             if play and (self._named or selection.judge.accepts(below, found)):
-                strokes = play.with_best_radius(strokes, basis)
+                strokes = self._weighted(play.with_best_radius(strokes, basis), basis)
                 basis, has_start = (basis if has_start else Basis.empty(1)), True
             if complete and strokes is before:
                 break
@@ -194,6 +192,23 @@ class Hysteresis(ModelClass):
             )
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
         return found
+
+    def _weighted(self, strokes: HysteresisInput, basis: Basis, near: int = NEXT_TO_TURN) -> HysteresisInput:
+        """Returns direction states with weights of the rows behind turns, from fits of given wavelets that use
+        the weights before. `near` is that of :func:`weights_behind_turns`."""
+        data, samples = self._selection.data, self._selection.samples
+        reach = float(np.ptp(data.force[data.fitted]))
+        if data.order is None or strokes.weight is not None or reach == 0.0:
+            return strokes
+        order = data.order * data.fitted
+        touched = np.abs(data.force) > self._selection.options.search.contact_share * reach
+        for _ in range(REWEIGHTINGS):
+            problem = samples.problem(samples.rows(strokes), strokes)
+            found = self._selection.candidate(self.name, problem, problem.solve(basis), "", strokes=strokes)
+            residual, least = data.force - found.force_at(), FORCE_RESOLUTION * reach
+            weight = weights_behind_turns(data.path[:, 0], order, residual, touched, least, near)
+            strokes = replace(strokes, weight=weight)
+        return strokes
 
     def _single_valued(self, hysteresis: Candidate) -> Candidate:
         """Returns a single-valued force with the wavelets of a network with hysteresis; superfluous wavelets
@@ -332,7 +347,7 @@ class PlaySearch:
         All play radii are compared on the same rows, so that the random error of further rows has no
         influence.
         """
-        strokes = replace(strokes, known=known)
+        strokes = replace(strokes, known=known, weight=None)
         problem = self._samples.problem(self._samples.rows(strokes), strokes)
         return problem.total(problem.solve(basis).rss)
 

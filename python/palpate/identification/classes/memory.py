@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model class memory: how many branches that relax the recordings support, and the force at rest.
+"""Model class memory: how many branches that relax or slip the recordings support, and the force at rest.
 
-Branches and wavelets of the ratio are added one at a time while the criterion decreases, and time constants
-and ratio are refined after each. Then the force at rest is identified as any force of position.
+Branches and wavelets of the ratio are added one at a time while the criterion decreases, and all are refined
+after each. Then the force at rest is identified as any force of position.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import scipy
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
-from ...recording.motion import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, deviance
-from .memory_fit import STEPS, MemoryFit, Motion, Resting, Shape
+from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
@@ -44,7 +44,10 @@ MOST_RATIO_WAVELETS = 4
 """Largest number of wavelets in the ratio."""
 
 GRID_PER_DECADE = 3
-"""Number of time constants in a decade that are tried for a new branch."""
+"""Number of time constants, or of yield stretches, in a decade that are tried for a new branch."""
+
+LARGEST_YIELD = 0.5
+"""Largest yield stretch [travel]: a branch with a larger one is a spring over a whole stroke."""
 
 RESOLVED_RATIO = 1.5
 """Least ratio of the largest time constant to the smallest one that the recordings resolve, and of the
@@ -83,15 +86,27 @@ class Choice:
 
 
 def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
-    """Returns the branches, the ratio and the number of splines that the criterion accepts."""
+    """Returns the branches, the ratio and the number of splines that the criterion accepts.
+
+    All branches relax, or all slip: together they would fit friction that creeps in a pause, and predict other
+    motions badly.
+    """
     criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+    kinds = [False] if recorded.ranges.log_tau is None else [True, False]
+    found = [_grown(recorded, options, criterion, relaxes) for relaxes in kinds]
+    rows = min(each.fit.independent(each.shape) for each in found)
+    return min(found, key=lambda each: each.value(rows, criterion))
+
+
+def _grown(recorded: Recorded, options: IdentifyOptions, criterion: str, relaxes: bool) -> Choice:
+    """Returns the accepted choice of branches that all relax, or all slip."""
     best = Choice(0, recorded.fit(0))
     while True:
         expected = best.rms()
         current = replace(best, fit=recorded.fit(best.splines, expected))
         best, rows = current, current.fit.independent(current.shape)
         value = current.value(rows, criterion) - options.search.evidence
-        for trial in _larger(current, recorded):
+        for trial in _larger(current, recorded, relaxes):
             now = trial.value(rows, criterion)
             if now < value:
                 value, best = now, trial
@@ -99,31 +114,27 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
             break
     if best.shape is None:
         return best
-    refined = best.fit.refined(best.shape, recorded.log_tau, 3 * STEPS)
-    return replace(best, shape=_without_idle(best.fit, refined))
+    refined = best.fit.refined(best.shape, recorded.ranges, 3 * STEPS)
+    return replace(best, shape=refined.without_idle(best.fit.solved(refined)[1]))
 
 
-def _without_idle(fit: MemoryFit, shape: Shape) -> Shape | None:
-    """Returns the shape without branches of stiffness 0."""
-    kept = fit.solved(shape)[1] > 0.0
-    return replace(shape, log_tau=shape.log_tau[kept]) if kept.any() else None
-
-
-def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
+def _larger(now: Choice, recorded: Recorded, relaxes: bool) -> Iterator[Choice]:
     """Yields refined memories with one more branch, one more term of the ratio, or more splines."""
-    fit, shape, log_tau = now.fit, now.shape, recorded.log_tau
+    fit, shape, ranges = now.fit, now.shape, recorded.ranges
 
     def best(trials: Iterable[Shape]) -> Choice:
-        return replace(now, shape=fit.refined(min(trials, key=fit.rss), log_tau))
+        return replace(now, shape=fit.refined(min(trials, key=fit.rss), ranges))
 
     for splines in range(now.splines + 1, len(SPLINES))[::2]:
         finer = Choice(splines, recorded.fit(splines, now.rms()), shape)
-        yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, log_tau))
-    base = Shape(np.empty(0)) if shape is None else shape
-    if len(base.log_tau) < MOST_BRANCHES:
-        count = max(2, 1 + round((log_tau[1] - log_tau[0]) / np.log(10.0) * GRID_PER_DECADE))
-        grid = np.linspace(*log_tau, count)
-        yield best(replace(base, log_tau=np.append(base.log_tau, at)) for at in grid)
+        yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, ranges))
+    base = shape or Shape()
+    if base.n_branches < MOST_BRANCHES:
+        if relaxes and ranges.log_tau is not None:
+            yield best(replace(base, log_tau=np.append(base.log_tau, at)) for at in _grid(*ranges.log_tau))
+        else:
+            grid = _grid(*ranges.log_yield)
+            yield best(replace(base, log_yield=np.append(base.log_yield, at)) for at in grid)
     if shape is None:
         return
     if not shape.sloped and not len(shape.wavelets):
@@ -135,6 +146,11 @@ def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
             for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
             for alpha in (1.5, 4.0, 10.0)
         )
+
+
+def _grid(least: float, most: float) -> Float1D:
+    """Returns evenly spread logarithms."""
+    return np.linspace(least, most, max(2, 1 + round((most - least) / np.log(10.0) * GRID_PER_DECADE)))
 
 
 def _splines(position: Float1D, count: int) -> Float2D:
@@ -168,14 +184,22 @@ class Recorded:
         return tuple(self._motion(part, step) for part in self.recordings)
 
     def _motion(self, part: Recording, step: int) -> Motion:
-        assert part.time is not None
-        time, position, force = part.time[::step], part.position[::step], part.force[::step]
+        time, position, force = part.time_or_row[::step], part.position[::step], part.force[::step]
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
         return Motion(time, box, force / self.spread)
 
     @cached_property
-    def log_tau(self) -> tuple[float, float]:
-        """Logarithms of the smallest and the largest time constant that the recordings can resolve [s]."""
+    def ranges(self) -> Ranges:
+        """Time constants and yield stretches that the recordings can resolve."""
+        band = max(noise_band((part.position - self.lower) / self.travel) for part in self.recordings)
+        log_yield = float(np.log(min(band, 0.5 * LARGEST_YIELD))), float(np.log(LARGEST_YIELD))
+        return Ranges(
+            None if any(part.time is None for part in self.recordings) else self._log_tau(), log_yield
+        )
+
+    def _log_tau(self) -> tuple[float, float]:
+        """Returns logarithms of the smallest and the largest time constant that the recordings can resolve
+        [s]."""
         steps = np.concatenate(
             [
                 np.diff(part.time)[np.abs(np.diff(part.position)) > 1e-4 * self.travel]
@@ -218,7 +242,10 @@ class Recorded:
 
     def memory(self, shape: Shape, stiffness: Float1D) -> FittedMemory:
         """Returns a memory in the units of the recordings, with its branches in order of time constant."""
-        order = np.argsort(shape.log_tau)
+        relaxes, slips = np.full(len(shape.log_tau), np.inf), np.full(len(shape.log_yield), np.inf)
+        time_constant_s = np.append(np.exp(shape.log_tau), slips)
+        yield_stretch = np.append(relaxes, self.travel * np.exp(shape.log_yield))
+        order = np.lexsort([yield_stretch, time_constant_s])
         ratio = shape.ratio
         linear = ratio.linear / self.travel
         return FittedMemory(
@@ -228,7 +255,8 @@ class Recorded:
             linear=linear,
             bias=ratio.bias - linear * self.lower,
             stiffness=stiffness[order] * self.spread / self.travel,
-            time_constant_s=np.exp(shape.log_tau[order]),
+            time_constant_s=time_constant_s[order],
+            yield_stretch=yield_stretch[order],
         )
 
 
@@ -238,9 +266,10 @@ def untested(
     """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
     tested."""
     automatic = options.inputs == "auto" and options.period is None and options.search.filters == "matched"
+    in_order = all(part.time is not None or _in_order(part) for part in recordings)
     if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
         return ""
-    if not automatic or any(part.time is None or len(part.input_names) for part in recordings):
+    if not (automatic and in_order) or any(len(part.input_names) for part in recordings):
         return ""
     if "velocity" in found.inputs:
         return _unsupported(options)
@@ -254,6 +283,12 @@ def untested(
             f"correlation below {upper:.2g}, a memory needs {LEAST_CORRELATION:g}"
         )
     return _unsupported(options)
+
+
+def _in_order(recording: Recording) -> bool:
+    """True if the rows of a recording without time are in the order of a motion."""
+    stated = recording.direction is not None
+    return states_its_order(recording) if stated else ordered_strokes(recording) is not None
 
 
 def _unsupported(options: IdentifyOptions) -> str | None:
@@ -289,16 +324,20 @@ def better_with_memory(
         return _refused(found, _gain_text(in_sample, 0.0))
     at_rest = recorded.at_rest(choice, identify_rest)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
-    refined = _without_idle(fit, fit.refined(choice.shape, recorded.log_tau, 3 * STEPS))
+    shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
+    refined = shape.without_idle(fit.solved(shape)[1])
     if refined is None:
         return _refused(found, "no branch lowers the criterion")
-    shortest, longest = np.exp(recorded.log_tau)
-    if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
-        return _refused(found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve")
-    if np.exp(refined.log_tau.min()) > longest / RESOLVED_RATIO:
-        return _refused(
-            found, f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
-        )
+    if recorded.ranges.log_tau is not None and not len(refined.log_yield):
+        shortest, longest = np.exp(recorded.ranges.log_tau)
+        if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
+            return _refused(
+                found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve"
+            )
+        if np.exp(refined.log_tau.min()) > longest / RESOLVED_RATIO:
+            return _refused(
+                found, f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
+            )
     coefficients, stiffness = fit.solved(refined)
     network = replace(
         at_rest,
@@ -308,15 +347,23 @@ def better_with_memory(
         memory=recorded.memory(refined, stiffness),
         below="free" if recorded.contact else "linear",
     )
-    (error, of_motion), findings = _errors(network, recordings), list(_undetermined(found, recordings))
+    weights = (
+        found.share if found.share is not None and len(found.share) == sum(map(len, recordings)) else None
+    )
+    (error, of_motion), findings = (
+        _errors(network, recordings, weights),
+        list(_undetermined(found, recordings)),
+    )
     linear = replace(network, below="linear")
-    others = _errors(linear, recordings)
+    others = _errors(linear, recordings, weights)
     if recorded.contact and options.below == "auto" and others[0] < error:
         findings.append(_pulls(recordings[0], recorded, others[0], error))
         network, (error, of_motion) = linear, others
-    if of_motion**2 > (1.0 + LEAST_GAIN) * found.rmse**2:
-        # Friction creeps in a pause. Its rows alone would accept a model that is wrong while the tool moves.
-        change = recordings[0].file_unit("force").interval(found.rmse, of_motion)
+    before_motion = found.rmse if weights is None else found.settled_rmse
+    if of_motion**2 > (1.0 + LEAST_GAIN) * before_motion**2:
+        # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that is
+        # wrong while the tool moves.
+        change = recordings[0].file_unit("force").interval(before_motion, of_motion)
         return _refused(found, f"it raises the RMS error while the tool moves from {change}")
     nrmse = error / recorded.spread
     held_out = fit.held_out_errors(refined)
@@ -347,12 +394,24 @@ def better_with_memory(
         findings=tuple(findings),
         path=found.path + network.path,
         decisions=(*found.decisions, decision),
-        notes=(
-            *found.notes,
-            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; "
-            f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
-        ),
+        notes=(*found.notes, *_branches(recorded, refined)),
     )
+
+
+def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
+    """Yields notes on the time constants and yield stretches of a memory, and on those that the recordings
+    resolve."""
+    if len(shape.log_tau) and recorded.ranges.log_tau is not None:
+        shortest, longest = np.exp(recorded.ranges.log_tau)
+        found = ", ".join(f"{tau:.3g}" for tau in np.sort(np.exp(shape.log_tau)))
+        yield (
+            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; found: "
+            f"{found} s."
+        )
+    if len(shape.log_yield):
+        position = recorded.recordings[0].file_unit("position")
+        found = ", ".join(position.text(recorded.travel * most) for most in np.sort(np.exp(shape.log_yield)))
+        yield f"The loops grow with the distance moved: parts of the object slip from stretches of {found} on."
 
 
 def _pulls(recording: Recording, recorded: Recorded, linear: float, free: float) -> Finding:
@@ -392,17 +451,19 @@ IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
 the sum of their squared errors, and the largest number of wavelets"""
 
 
-def _errors(network: FittedNetwork, recordings: Sequence[Recording]) -> tuple[float, float]:
+def _errors(
+    network: FittedNetwork, recordings: Sequence[Recording], weights: Float1D | None
+) -> tuple[float, float]:
     """Returns the RMS errors of a model with memory on all rows of recordings, and on the rows at which the
-    tool moves [force]."""
+    tool moves, with weights (n,) of all rows [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
     )
     squares, moving = [], []
     for part in recordings:
-        if part.time is not None:
-            squares.append((model.force_over_time(part.time, part.position)[0] - part.force) ** 2)
-            moving.append(roles_of(part) == Role.MOVING)
+        squares.append((model.force_over_time(part.time_or_row, part.position)[0] - part.force) ** 2)
+        moving.append(roles_of(part) == Role.MOVING)
     square = np.concatenate(squares)
-    return float(np.sqrt(square.mean())), float(np.sqrt(square[np.concatenate(moving)].mean()))
+    share = np.concatenate(moving) * (1.0 if weights is None else weights)
+    return float(np.sqrt(square.mean())), float(np.sqrt(np.average(square, weights=share)))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Least squares of a force at rest and of branches that relax, over the time of recordings.
+"""Least squares of a force at rest and of branches that relax or slip, over the time of recordings.
 
-The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest,
-p the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
-linear in g and k_j: they follow from least squares with k_j >= 0.
+The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j or |e_j| <= Y_j. g is the
+force at rest, p the ratio. Each branch has a stiffness k_j >= 0, and a time constant tau_j or a yield stretch
+Y_j. For given p, tau and Y the force is linear in g and k_j: they follow from least squares with k_j >= 0.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from ..._core.model import ForceModel, stretches
+from ..._core.model import ForceModel, play, stretches
 from ..._typing import Float1D, Float2D
 from ..data.limits import independent_share
 from ..search.evidence import CRITERIA
@@ -67,10 +67,24 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Shape:
-    """Time constants of the branches and parameters of the ratio p = 1 + c (x - 1/2) + sum_i w_i psi(...)."""
+class Ranges:
+    """Smallest and largest parameters of a branch that recordings resolve."""
 
-    log_tau: Float1D
+    log_tau: tuple[float, float] | None
+    """Logarithms of time constants [s]; None without time"""
+    log_yield: tuple[float, float]
+    """Logarithms of yield stretches [travel]"""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Time constants and yield stretches of the branches, and parameters of the ratio p = 1 + c (x - 1/2) +
+    sum_i w_i psi(...)."""
+
+    log_tau: Float1D = field(default_factory=lambda: np.empty(0))
+    """Logarithm of the time constant of each branch that relaxes [s]"""
+    log_yield: Float1D = field(default_factory=lambda: np.empty(0))
+    """Logarithm of the yield stretch of each branch that slips [travel]"""
     slope: float = 0.0
     wavelets: Float2D = field(default_factory=lambda: np.zeros((0, 3)))
     """(m, 3) weight, translation and logarithm of the dilation of each wavelet"""
@@ -80,27 +94,45 @@ class Shape:
     @property
     def n_parameters(self) -> int:
         """Number of fitted values, stiffnesses included."""
-        return 2 * len(self.log_tau) + int(self.sloped) + self.wavelets.size
+        return 2 * self.n_branches + int(self.sloped) + self.wavelets.size
+
+    @property
+    def n_branches(self) -> int:
+        return len(self.log_tau) + len(self.log_yield)
 
     def vector(self) -> Float1D:
         slope = [self.slope] if self.sloped else []
-        return np.concatenate([self.log_tau, slope, self.wavelets.ravel()])
+        return np.concatenate([self.log_tau, self.log_yield, slope, self.wavelets.ravel()])
 
     def at(self, vector: Float1D) -> Shape:
         """Returns the shape with the parameters of `vector`."""
-        branches, rest = len(self.log_tau), vector[len(self.log_tau) :]
-        slope = float(rest[0]) if self.sloped else 0.0
+        sizes = (len(self.log_tau), len(self.log_yield), int(self.sloped))
+        log_tau, log_yield, slope, wavelets = np.split(vector, np.cumsum(sizes))
         return replace(
-            self, log_tau=vector[:branches], slope=slope, wavelets=rest[int(self.sloped) :].reshape(-1, 3)
+            self,
+            log_tau=log_tau,
+            log_yield=log_yield,
+            slope=float(slope.sum()),
+            wavelets=wavelets.reshape(-1, 3),
         )
 
-    def bounds(self, log_tau: tuple[float, float]) -> tuple[Float1D, Float1D]:
+    def bounds(self, ranges: Ranges) -> tuple[Float1D, Float1D]:
         """Returns the smallest and the largest values of `vector`."""
-        branches, wavelets = len(self.log_tau), len(self.wavelets)
-        slope = int(self.sloped)
-        low = [log_tau[0]] * branches + [-10.0] * slope + [-5.0, -0.3, 0.0] * wavelets
-        high = [log_tau[1]] * branches + [10.0] * slope + [5.0, 1.3, 2.5] * wavelets
-        return np.array(low), np.array(high)
+        low, high = np.array(
+            [
+                *[ranges.log_tau or (0.0, 0.0)] * len(self.log_tau),
+                *[ranges.log_yield] * len(self.log_yield),
+                *[(-10.0, 10.0)] * int(self.sloped),
+                *[(-5.0, 5.0), (-0.3, 1.3), (0.0, 2.5)] * len(self.wavelets),
+            ]
+        ).T
+        return low, high
+
+    def without_idle(self, stiffness: Float1D) -> Shape | None:
+        """Returns the shape without branches of stiffness 0; None if none is left."""
+        relaxing, slipping = np.split(stiffness > 0.0, [len(self.log_tau)])
+        left = replace(self, log_tau=self.log_tau[relaxing], log_yield=self.log_yield[slipping])
+        return left if left.n_branches else None
 
     @cached_property
     def ratio(self) -> Ratio:
@@ -187,9 +219,15 @@ class MemoryFit:
         tau = np.exp(shape.log_tau)
         parts = []
         for motion in self.motions:
-            coordinate = np.asarray(ratio.energy(motion.position))[:, None]
-            found = stretches(motion.time, coordinate, tau)[:, 0]
-            parts.append(np.asarray(ratio.force(motion.position))[:, None] * found)
+            coordinate = np.ascontiguousarray(ratio.energy(motion.position))
+            found = [
+                *stretches(motion.time, coordinate[:, None], tau)[:, 0].T,
+                *(
+                    coordinate - play(coordinate, most, start=coordinate[0])
+                    for most in np.exp(shape.log_yield)
+                ),
+            ]
+            parts.append(np.asarray(ratio.force(motion.position))[:, None] * np.column_stack(found))
         return np.concatenate(parts)
 
     def residual(self, shape: Shape) -> Float1D:
@@ -205,9 +243,9 @@ class MemoryFit:
         target = self._padded((self._force - columns @ stiffness)[:, None])[:, 0]
         return np.linalg.lstsq(self._resting, target, rcond=None)[0], stiffness
 
-    def refined(self, shape: Shape, log_tau: tuple[float, float], steps: int = STEPS) -> Shape:
-        """Returns the shape with refined time constants and ratio, of no larger error."""
-        low, high = shape.bounds(log_tau)
+    def refined(self, shape: Shape, ranges: Ranges, steps: int = STEPS) -> Shape:
+        """Returns the shape with refined branches and ratio, of no larger error."""
+        low, high = shape.bounds(ranges)
         start = np.clip(shape.vector(), low + 1e-6, high - 1e-6)
 
         def residual(vector: Float1D) -> Float1D:

@@ -98,7 +98,7 @@ class MassAndDamping(ModelClass):
     def better(self, below: Candidate) -> Candidate:
         selection, motion, data = self._selection, self._selection.motion, self._selection.data
         assert motion is not None
-        values, decisions = motion.accepted(below.solution.basis, below.side)
+        values, decisions = motion.accepted(below.solution.basis, below.strokes)
         selection.report.decisions.extend(decisions)
         best, current, names = below, selection, tuple(values)
         for _ in range(MOST_DYNAMIC_SELECTIONS):
@@ -115,7 +115,7 @@ class MassAndDamping(ModelClass):
                 n_parameters=current.best.n_parameters + len(values),
                 moving=moving,
             )
-            values = motion.values(best.solution.basis, best.side, names)
+            values = motion.values(best.solution.basis, best.strokes, names)
         if best is below:
             return below
         note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."

@@ -132,8 +132,13 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
     force = data.force if best.moving is None else data.force - best.moving.force
+    weight = best.strokes.share if best.strokes is not None else np.ones(len(used))
     compressor = Compressor(
-        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
+        data.box,
+        force,
+        weight=weight if data.weight is None else weight * data.weight,
+        max_positions=best.rows.cells,
+        limits=data.limits,
     )
     rows = np.flatnonzero(used)
     together = max(1, round(len(rows) / best.problem.independent))
@@ -143,7 +148,9 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     if len(data.names) == 1:
         fit = selection.growth.grown_again if len(rows) <= FEW_ROWS else selection.growth.refined
     for number in range(HELD_OUT_EVERY):
-        again, left = _left_out(best, compressor, force, used & (fold != number), used & (fold == number), fit)
+        again, left = _left_out(
+            best, compressor, force, used & (fold != number), used & (fold == number), fit
+        )
         residual[left] = again[left]
     return replace(best.error, residual=residual).nrmse
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,16 +124,15 @@ class Compressor:
         represent."""
         return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
 
-    def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
+    def rows(self, side: Float1D | None = None, share: NDArray[Any] | None = None) -> Compressed:
         """Returns compressed rows; rows in different cells of the direction state `side` (n,) are not merged.
 
-        `only` (n,) selects rows of the recording.
+        `share` (n,) from 0 to 1 multiplies the weights of the rows of the recording.
         """
         key = self._key
-        if only is not None:
-            return self._part(only[self.kept]).rows(
-                None if side is None else side[self.kept][only[self.kept]]
-            )
+        if share is not None:
+            used = share[self.kept] > 0
+            return self._part(share[self.kept]).rows(None if side is None else side[self.kept][used])
         if side is not None:
             side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
@@ -162,13 +162,13 @@ class Compressor:
         scatter = float(weight @ dx[:, 0] ** 2) / samples
         return Compressed(x, y, count, merged_side, within, samples, self._limits, scatter, self._cells)
 
-    def _part(self, rows: NDArray[np.bool_]) -> Compressor:
-        """Returns a compressor of the rows that `rows` marks with True, with the position cells of this
-        compressor."""
-        part = copy(self)
+    def _part(self, share: NDArray[Any]) -> Compressor:
+        """Returns a compressor of the rows with a share above 0, which multiplies their weights, with the
+        position cells of this compressor."""
+        part, rows = copy(self), share > 0
         part.kept = np.arange(np.count_nonzero(rows))
         part._key, part._positions = self._key[rows], self._positions[rows]
-        part._force, part._weight = self._force[rows], self._weight[rows]
+        part._force, part._weight = self._force[rows], self._weight[rows] * share[rows]
         part._within = self._within * float(part._weight.sum() / self._weight.sum())
         return part
 

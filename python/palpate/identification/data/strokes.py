@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise, product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import TURN_SHARE, ordered_strokes, states_its_order, turns_of
+from ...recording.motion import ordered_strokes, states_its_order, turns_of
 from ...verdict import Finding, usable
 from ..decision import Decision
 
@@ -213,39 +213,78 @@ def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> 
     return ", ".join(f"{ways.count(way)} {word}" for word, way in words.items() if ways.count(way))
 
 
-def parallel_behind_turns(path: Float1D, force: Float1D, order: Float1D) -> Float1D:
-    """Returns the forces (n,) of strokes without their reversals.
+NEAR_TURN = 2.0 ** np.arange(-9.0, -2.0)
+"""Distances from a turn between which rows are taken to have one noise [travel]."""
 
-    Behind a turn the friction of an object reverses over a distance, in which the force goes from that of the
-    stroke before to that of the new stroke. These rows have the new direction, but not its force. There the
-    new stroke continues parallel to the stroke before, with the difference next to the turn. The distance is
-    twice that to the middle between both strokes.
+FAR = len(NEAR_TURN)
+"""Number of the largest distance."""
+
+NEXT_TO_TURN = 2
+"""Number of distances, from the smallest one, next to a turn."""
+
+
+def weights_behind_turns(
+    path: Float1D,
+    order: Float1D,
+    residual: Float1D,
+    touched: NDArray[np.bool_],
+    least: float,
+    near: int = NEXT_TO_TURN,
+) -> Float1D:
+    """Returns the weight (n,) of each row in a fit, from 0 to 1.
+
+    Friction reverses behind a turn in a way that a model with a direction state follows only roughly, and the
+    direction of a row next to a turn is uncertain. The n rows that are as far behind the turns at one end share
+    this error, of variance v_s, besides an error of variance v: their weight is v / (v + n v_s). v + v_s is their
+    mean squared residual, and v that of rows as far before these turns: the other stroke, with the same
+    positions. A tool that leaves the object at one end shows walls and clicks near the other one, so that only
+    rows next to its turns are weighted.
 
     Parameters
     ----------
     path : (n,) array
         Positions in recorded order [travel].
-    force : (n,) array
     order : (n,) array
         Direction of each row from the order of rows; 0 for rows of no stroke.
+    residual : (n,) array
+        Force of the rows minus that of a model [force].
+    touched : (n,) array
+        True for rows in contact.
+    least : float
+        Smallest error that the force sensor resolves [force], above 0.
+    near : int
+        Number of distances that are weighted if the tool leaves the object.
     """
-    result, moving = force.copy(), np.flatnonzero(order)
-    strokes = np.split(moving, np.flatnonzero(np.diff(order[moving])) + 1)
-    for before, stroke in pairwise(strokes):
-        known = before[np.argsort(path[before])]
-        moved = np.abs(path[stroke] - path[before[-1]])
-        parallel = np.interp(path[stroke], path[known], force[known])
-        apart = force[stroke] - parallel
-        next_to = apart[(moved >= TURN_SHARE) & (moved < 2.0 * TURN_SHARE)]
-        loop = float(next_to.mean()) if len(next_to) else 0.0
-        if loop == 0.0 or np.ptp(path[before]) < 2.0 * TURN_SHARE:
-            continue
-        reversed_by = np.append(0.0, np.where(moved < TURN_SHARE, apart / loop, 1.0))
-        middle = int(np.argmax(reversed_by >= 0.5))
-        at, between = np.append(0.0, moved)[[middle - 1, middle]], reversed_by[[middle - 1, middle]]
-        behind = moved < 2.0 * np.interp(0.5, between, at)
-        result[stroke[behind]] = parallel[behind] + loop
-    return result
+    moving, weight = np.flatnonzero(order), np.ones(len(path))
+    if not len(moving):
+        return weight
+    x, way, square = path[moving], order[moving] > 0.0, residual[moving] ** 2 + least**2
+    turns = np.diff(way, prepend=not way[0])
+    stroke, first = np.cumsum(turns) - 1, np.flatnonzero(turns)
+    begins, ends = np.maximum(first - 1, 0), np.append(first[1:], len(x)) - 1
+    leaves = not touched[moving][ends].all()
+
+    def parts(turn: NDArray[np.intp], at_bottom: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Returns the number of the end and of the distance (n,) of each row from the turn of its stroke."""
+        distance = np.searchsorted(NEAR_TURN, np.abs(x - x[turn][stroke]))
+        return np.where(leaves & (distance >= near), FAR, distance) + (FAR + 1) * at_bottom
+
+    behind, before = parts(begins, way), parts(ends, ~way)
+    if not (far := behind % (FAR + 1) == FAR).any():
+        return weight
+
+    def mean(part: NDArray[np.intp]) -> Float1D:
+        count = np.bincount(part, minlength=2 * FAR + 2)
+        return np.bincount(part, square, 2 * FAR + 2) / np.where(count, count, np.nan)
+
+    of_all = float(np.mean(square[far]))
+    expected = np.fmax(mean(before), of_all)
+    expected[:: FAR + 1] = of_all
+    for part, found in ((behind, mean(behind)), (np.where(before % (FAR + 1), FAR, before), mean(before))):
+        shared = np.where(part % (FAR + 1) < FAR, np.fmax(found - expected, 0.0)[part], 0.0)
+        here = expected[part] / (expected[part] + shared * np.bincount(part)[part])
+        weight[moving] = np.minimum(weight[moving], here)
+    return weight
 
 
 @dataclass(frozen=True)
@@ -258,6 +297,13 @@ class HysteresisInput:
     """(n,) True for rows whose direction state does not depend on the motion before the recording"""
     play_radius: float | None = None
     """[box]"""
+    weight: Float1D | None = None
+    """(n,) weight of each row in the fit, from 0 to 1; None: 1 each"""
+
+    @property
+    def share(self) -> Float1D:
+        """(n,) weight in the fit of each row with known direction state, 0 of the others."""
+        return np.where(self.known, 1.0 if self.weight is None else self.weight, 0.0)
 
     @property
     def both_ways(self) -> bool:

@@ -48,7 +48,9 @@ class FittedMemory:
     stiffness: Float1D
     """(J,) stiffness of each branch [force/position]"""
     time_constant_s: Float1D
-    """(J,) time constant of each branch [s]"""
+    """(J,) time constant of each branch, infinite if it does not relax [s]"""
+    yield_stretch: Float1D
+    """(J,) stretch at which each branch slips, infinite if it does not [position]"""
 
     def memory(self) -> Memory:
         """Returns the memory of a model."""
@@ -106,6 +108,10 @@ class FittedNetwork:
     """RMS error divided by the standard deviation of the force [-]"""
     rmse_of_all: float = 0.0
     """RMS error on every row of the recordings, also on those that are not fitted [force]"""
+    share: Float1D | None = None
+    """(n,) weight of each row in the fit, from 0 to 1; None: 1 each"""
+    settled_rmse: float = 0.0
+    """RMS error with the weights `share` [force]"""
     left_out_nrmse: float = 0.0
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
     residuals: int = 0
@@ -183,7 +189,7 @@ class FittedNetwork:
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
-            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all")
+            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse")
         }
         return replace(
             self,

@@ -42,8 +42,8 @@ from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
 LEAST_GAIN = 0.25
-"""Least share of the squared error that velocity as an input, or a memory, must explain [-]: these forces are
-harder to render and to certify."""
+"""Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]: these
+forces are harder to render and to certify."""
 
 MOST_NOISE_ROWS = 50_000
 """Largest number of rows from which the noise where two models differ is computed; of more rows an evenly
@@ -229,6 +229,11 @@ class Candidate:
         return None if self.strokes is None else self.strokes.side
 
     @property
+    def share(self) -> Float1D | float:
+        """(n,) weight of every row in the fit, from 0 to 1, besides the samples that it represents."""
+        return 1.0 if self.strokes is None else self.strokes.share
+
+    @property
     def play_radius(self) -> float | None:
         """[box]"""
         return None if self.strokes is None else self.strokes.play_radius
@@ -384,12 +389,11 @@ class Samples:
         """
         only = ~self._held_out if self._for_criterion else None
         if strokes is None:
-            rows = self._compressor.rows(only=only)
+            rows = self._compressor.rows(share=only)
         else:
-            known = strokes.known if only is None else only & strokes.known
-            rows = self._compressor.rows(strokes.side, known)
-            if not strokes.known.all():
-                rows = rows.reweighted_to(self._compressor.samples(only))
+            share = strokes.share if only is None else only * strokes.share
+            rows = self._compressor.rows(strokes.side, share)
+            rows = rows.reweighted_to(self._compressor.samples(only))
         return rows if self.data.period is None else around_seam(rows)
 
     def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:

@@ -281,3 +281,41 @@ def test_friction_that_creeps_in_pauses_gives_no_memory() -> None:
     at = np.linspace(0.2, 0.8, 50)
     loop = model.force(at, direction=np.ones(50)) - model.force(at, direction=-np.ones(50))
     assert loop == pytest.approx(0.6, rel=0.05)
+
+
+def slipping(position: np.ndarray) -> np.ndarray:
+    """Returns the force of two springs that slip from stretches of 0.05 and 0.3 on, beside a soft spring."""
+    return 0.5 * position + sum(
+        k * (position - play(position, most, start=position[0])) for k, most in ((4.0, 0.05), (1.5, 0.3))
+    )
+
+
+def growing(*amplitudes: float) -> np.ndarray:
+    """Returns the positions of cycles of these amplitudes."""
+    turns = np.array([0.0, *np.ravel([(a, -a) for a in amplitudes]), 0.0])
+    at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(turns)))])
+    return np.interp(np.arange(0.0, at[-1], 0.004), at, turns)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_loops_that_grow_with_the_distance_become_branches_that_slip(timed: bool) -> None:
+    """Branches that only slip depend on the order of rows, so that a recording needs no time."""
+    position = growing(0.2, 0.5, 1.0)
+    time = np.linspace(0.0, 30.0, len(position)) if timed else None
+    recording = Recording.from_arrays(position, with_noise(slipping(position), 0.005), time)
+    model = palpate.identify(recording)
+    assert model.memory is not None
+    assert np.isinf(model.memory.time_constant_s).all()
+    np.testing.assert_allclose(model.memory.yield_stretch, [0.05, 0.3], rtol=0.05)
+    np.testing.assert_allclose(model.memory.stiffness, [4.0, 1.5], rtol=0.05)
+    other = growing(0.8, 0.1, 0.6)
+    fresh = Recording.from_arrays(other, slipping(other), None)
+    assert palpate.verify(model, fresh).nrmse < 0.01
+    assert any("slip from stretches" in line for line in model.notes["identification"])
+
+
+def test_one_loop_stays_hysteresis() -> None:
+    position = growing(1.0)
+    model = palpate.identify(position, with_noise(position + 0.2 * np.sign(np.gradient(position)), 0.005))
+    assert model.memory is None
+    assert model.hysteretic

@@ -12,7 +12,7 @@ from any_input import SCALE
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate._core.model import play
 from palpate.cli.main import main
-from palpate.identification.data.strokes import parallel_behind_turns, strokes_of
+from palpate.identification.data.strokes import HysteresisInput, strokes_of, weights_behind_turns
 from palpate.recording.checks.recordings import scale_findings
 from palpate.recording.motion import strokes_from_order
 
@@ -282,18 +282,35 @@ def test_a_stated_direction_that_contradicts_the_order_of_one_stroke_is_kept() -
     assert (found.side == direction).all()
 
 
-def test_rows_behind_a_turn_continue_the_stroke_while_the_friction_reverses() -> None:
-    """The middle between both strokes shows where a friction has reversed; a force that changes at once at
-    the turn is kept."""
+def test_rows_behind_a_turn_have_the_weight_of_their_shared_error() -> None:
+    """Rows behind a turn that miss the force by 1 count less than one row, with noise of 0.01; the rows as far
+    before the turn count whole."""
+    path, random = np.tile(IN_AND_OUT, 2) / 4.0, np.random.default_rng(0)
+    order, touched = np.tile(SIDE, 2), np.ones(1600, dtype=bool)
+    residual = random.normal(0.0, 0.01, 1600)
+    behind = np.arange(1600) % 400 < 20
+    behind[:20] = True
+    weight = weights_behind_turns(path, order, np.where(behind, 1.0, residual), touched, 1e-6)
+    assert weight[behind].sum() < 0.02
+    assert np.median(weight[~behind]) == 1.0
+    assert weights_behind_turns(path, order, residual, touched, 1e-6).min() > 0.02
+
+
+def test_walls_at_the_far_end_of_an_object_that_the_tool_leaves_count_whole() -> None:
     path = IN_AND_OUT / 4.0
-    reversing, at_once = (np.clip((path - play(path, r)) / r, -1.0, 1.0) for r in (0.005, 1e-6))
-    strokes = path + 0.2 * SIDE
-    found = parallel_behind_turns(path, path + 0.2 * reversing, SIDE)
-    assert np.abs(path + 0.2 * reversing - strokes)[401:].max() > 0.1
-    assert found[401:] == pytest.approx(strokes[401:], abs=1e-9)
-    assert (
-        parallel_behind_turns(path, path + 0.2 * at_once, SIDE)[401:] == (path + 0.2 * at_once)[401:]
-    ).all()
+    touched = path > 0.02
+    behind = (np.arange(800) > 400) & (np.arange(800) < 420)
+    weight = weights_behind_turns(path, SIDE, 1.0 * behind, touched, 1e-3)
+    assert weight[behind & (path < 0.995)].min() == 1.0
+    assert weight[401] < 0.05
+
+
+def test_without_strokes_all_rows_count_whole() -> None:
+    none = np.zeros(9)
+    assert (weights_behind_turns(none, none, none, none > 0.0, 1e-3) == 1.0).all()
+    states = HysteresisInput(none, none == 0.0)
+    assert (states.share == 1.0).all()
+    assert (replace(states, known=none > 0.0).share == 0.0).all()
 
 
 def test_rows_with_a_stated_direction_in_another_order_are_not_followed_by_a_play_operator() -> None:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -118,9 +119,11 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
-/// Reads the key `memory` of a model file: the ratio, a network of one input, and the branches.
+/// Reads the key `memory` of a model file: the ratio, a network of one input, and the branches. A branch without a time
+/// constant (null) does not relax, and one without a yield stretch does not slip.
 inline MemoryParameters read_memory(const JsonField& memory) {
-    memory.require_keys({"alpha", "beta", "weight", "linear", "bias", "stiffness", "time_constant_s"});
+    memory.require_keys({"alpha", "beta", "weight", "linear", "bias", "stiffness", "time_constant_s",
+                         "yield_stretch"});
     MemoryParameters read;
     for (const JsonField& item : memory["alpha"].items()) {
         read.ratio.alpha.push_back(item.positive());
@@ -135,13 +138,21 @@ inline MemoryParameters read_memory(const JsonField& memory) {
     for (const JsonField& item : memory["stiffness"].items()) {
         read.stiffness.push_back(item.not_negative());
     }
-    for (const JsonField& item : memory["time_constant_s"].items()) {
-        read.time_constant_s.push_back(item.positive());
-    }
     const std::size_t branches = read.stiffness.size();
     memory["stiffness"].require(branches >= 1 && branches <= most_branches,
                                 "a list of 1 to " + std::to_string(most_branches) + " numbers");
-    memory["time_constant_s"].require_length(branches, "one for each branch");
+    const auto positive_or_null = [&](const char* name) {
+        std::vector<double> values;
+        for (const JsonField& item : memory[name].items()) {
+            values.push_back(item.is_null() ? std::numeric_limits<double>::infinity() : item.positive());
+        }
+        memory[name].require_length(branches, "one for each branch");
+        return values;
+    };
+    read.time_constant_s = positive_or_null("time_constant_s");
+    if (memory.value().contains("yield_stretch")) {
+        read.yield_stretch = positive_or_null("yield_stretch");
+    }
     return read;
 }
 
