@@ -59,6 +59,7 @@ identification/real_data.py --json build/bench/real_data.json
 identification/dynamic.py --json build/bench/dynamic.json
 identification/repeats.py --json build/bench/repeats.json
 identification/memory.py
+identification/growing_loops.py
 identification/ordinary.py --jobs 1 --json build/bench/ordinary.json
 identification/invariances.py $(full_or_short "" "half_the_rate repeated_rows --draws 1") --jobs 1 --json build/bench/invariances.json
 limits/certificate_table.py build/bench/certificate_search.txt --to $to

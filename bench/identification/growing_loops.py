@@ -3,9 +3,9 @@
 
 python bench/identification/growing_loops.py [--draws 12] [--json FILE]
 
-A tester moves the object over cycles of growing amplitude, as in a test of a damper or of a joint. Each draw has
-random parameters and noise of 1 % of the spread of the force. Errors are those of a further motion with other
-amplitudes, without noise.
+A tester moves the object over cycles of growing amplitude, as in a test of a damper or of a joint. Each draw
+has random parameters and noise of 1 % of the spread of the force. Errors are also those of a further motion
+with other amplitudes, without noise.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def masing(random: Generator) -> Callable[[Array], Array]:
 
 
 def bouc_wen(random: Generator) -> Callable[[Array], Array]:
-    """Returns f = a x + (1 - a) z, dz = (1 - |z / Y|^n (1/2 sgn(z dx) + 1/2)) dx, with the yield displacement Y
-    (Bouc 1967, Wen 1976)."""
+    """Returns f = a x + (1 - a) z, dz = (1 - |z / Y|^n (1/2 sgn(z dx) + 1/2)) dx, with the yield displacement
+    Y (Bouc 1967, Wen 1976)."""
     share, most, power = random.uniform(0.05, 0.3), random.uniform(0.1, 0.4), random.uniform(1.0, 4.0)
     return lambda x: share * x + (1.0 - share) * _internal(x, most, power)
 
@@ -83,8 +83,8 @@ def _internal(x: Array, most: float, power: float) -> Array:
 
 
 def pinched(random: Generator) -> Callable[[Array], Array]:
-    """Returns a Bouc-Wen object in series with a slack that closes with the amplitude: the loop narrows at its
-    middle (Baber and Noori 1985)."""
+    """Returns a Bouc-Wen object whose loop narrows at its middle, more so after larger amplitudes (Baber and
+    Noori 1985)."""
     whole, width, depth = bouc_wen(random), random.uniform(0.1, 0.25), random.uniform(0.5, 0.9)
 
     def force(x: Array) -> Array:

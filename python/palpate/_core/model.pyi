@@ -9,14 +9,17 @@ import typing
 __all__: list[str] = ['ForceModel', 'Memory', 'derivative_bounds', 'fingerprint', 'most_wavelets', 'play', 'slope_bounds', 'stretches', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
 class Memory:
     """
-    Memory of a relaxing object: J springs of stiffness k_j in series with dashpots (branches).
+    Memory of an object that relaxes or slips: J springs of stiffness k_j in series with a dashpot and
+    a slider (branches).
     
-    f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j. The ratio p is a network of one
-    input with the wavelets alpha, beta, weight, the slope `linear` and the constant `bias`.
+    f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j, |e_j| <= Y_j. The ratio p is a
+    network of one input with the wavelets alpha, beta, weight, the slope `linear` and the constant
+    `bias`.
     """
-    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], time_constant_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], time_constant_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], yield_stretch: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> None:
         """
-        Makes the memory. The model that gets it checks the values.
+        Makes the memory; without `yield_stretch` no branch slips. The model that gets it checks the
+        values.
         """
     @property
     def alpha(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -38,11 +41,16 @@ class Memory:
     @property
     def time_constant_s(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Time constant tau_j of each branch [s].
+        Time constant tau_j of each branch, infinite if it does not relax [s].
         """
     @property
     def weight(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
+    @property
+    def yield_stretch(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Stretch Y_j at which each branch slips, infinite if it does not [m or rad].
+        """
 class ForceModel:
     """
     A force law of d inputs x, with its domain and the continuation of the force outside the

@@ -146,7 +146,7 @@ class ExportedMemory:
         Share of a stretch that is left after a period at rest.
         """
     @property
-    def largest_stretch(self) -> float:
+    def largest_stretch(self) -> list[float]:
         ...
     @property
     def stiffness(self) -> list[float]:

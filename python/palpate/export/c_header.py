@@ -190,8 +190,8 @@ class _Numbers:
         yield _define("BRANCHES", len(memory.stiffness), "springs in series with a dashpot and a slider")
         yield _define("CONTACT", int(memory.contact), "1: the branches do not pull the tool")
         yield _define("MOST_FORCE", _double(self.model.force_limit), f"[{self.exported.force_unit}]")
-        yield "/* Stiffness of each branch, share of its stretch that is left after a tick at rest, largest stretch. */"
-        values_of = {
+        yield "/* Stiffness, share of a stretch left after a tick at rest, largest stretch of each branch. */"
+        values_of: dict[str, Sequence[float]] = {
             "stiffness": memory.stiffness,
             "kept": memory.kept,
             "most_stretch": memory.largest_stretch,

@@ -254,7 +254,7 @@ class Recording:
 
     @property
     def time_or_row(self) -> Float1D:
-        """Time of each row [s], or its number without time: enough for a force that depends on order alone."""
+        """Time of each row [s], or its number without time, for a force that depends on the order alone."""
         return np.arange(len(self), dtype=float) if self.time is None else self.time
 
     def split(self, every: int = 5) -> tuple[Recording, Recording]:

@@ -71,7 +71,7 @@ inline void validate(const MemoryParameters& memory, const Domain& domain) {
 ///
 /// Branches that only slip (tau_j infinite) are those of Masing and Iwan: loops whose width grows with their length. The
 /// ratio p gives an object other forces of the branches at other positions. The object stores the energy
-/// G(x) + sum_j k_j e_j^2 / 2 and dissipates the power sum_j k_j e_j dz_j/dt >= 0 (G is the antiderivative of g), so no
+/// G(x) + sum_j k_j e_j^2 / 2, with the antiderivative G of g. It dissipates the power sum_j k_j e_j dz_j/dt >= 0, so no
 /// closed motion generates energy, for any p.
 class MemoryNetwork {
   public:

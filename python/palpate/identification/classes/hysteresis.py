@@ -46,7 +46,7 @@ RADIUS_SEARCH_RATIO = 2.0
 ratio [-]."""
 
 REWEIGHTINGS = 5
-"""Number of fits of given wavelets, each with the weights that follow from the one before; they settle sooner."""
+"""Number of fits of given wavelets, each with the weights that follow from the fit before."""
 
 MOST_ROWS = 100_000
 """Largest number of rows for the comparison of two play radii; of more rows an evenly spread part is used."""
@@ -194,8 +194,8 @@ class Hysteresis(ModelClass):
         return found
 
     def _weighted(self, strokes: HysteresisInput, basis: Basis, near: int = NEXT_TO_TURN) -> HysteresisInput:
-        """Returns direction states with weights of the rows behind turns, from fits of given wavelets that use
-        the weights before. `near` is that of :func:`weights_behind_turns`."""
+        """Returns direction states with weights of the rows behind turns, from fits of given wavelets, each
+        with the weights before. `near` is that of :func:`weights_behind_turns`."""
         data, samples = self._selection.data, self._selection.samples
         reach = float(np.ptp(data.force[data.fitted]))
         if data.order is None or strokes.weight is not None or reach == 0.0:

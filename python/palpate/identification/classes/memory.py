@@ -88,8 +88,8 @@ class Choice:
 def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
     """Returns the branches, the ratio and the number of splines that the criterion accepts.
 
-    All branches relax, or all slip: together they would fit friction that creeps in a pause, and predict other
-    motions badly.
+    All branches relax, or all slip: together they would fit friction that creeps in a pause, and predict
+    other motions badly.
     """
     criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
     kinds = [False] if recorded.ranges.log_tau is None else [True, False]
@@ -405,13 +405,13 @@ def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
         shortest, longest = np.exp(recorded.ranges.log_tau)
         found = ", ".join(f"{tau:.3g}" for tau in np.sort(np.exp(shape.log_tau)))
         yield (
-            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; found: "
-            f"{found} s."
+            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; "
+            f"found: {found} s."
         )
     if len(shape.log_yield):
         position = recorded.recordings[0].file_unit("position")
         found = ", ".join(position.text(recorded.travel * most) for most in np.sort(np.exp(shape.log_yield)))
-        yield f"The loops grow with the distance moved: parts of the object slip from stretches of {found} on."
+        yield f"The loops grow with the distance moved: the branches slip from stretches of {found} on."
 
 
 def _pulls(recording: Recording, recorded: Recorded, linear: float, free: float) -> Finding:

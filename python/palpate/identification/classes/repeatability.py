@@ -118,6 +118,9 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
 
 
+Fit = Callable[[SeparableProblem, Basis], Solution]
+"""Fits a network with these wavelets, or one that grows from them."""
+
 FEW_ROWS = 500
 """Number of rows up to which a network is grown again for the error on left out rows; more rows change its
 wavelets little, and only its numbers are fitted again."""
@@ -144,9 +147,10 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     together = max(1, round(len(rows) / best.problem.independent))
     fold = np.full(len(used), -1)
     fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
-    residual, fit = best.error.residual.copy(), SeparableProblem.solve
+    residual, growth = best.error.residual.copy(), selection.growth
+    fit: Fit = SeparableProblem.solve
     if len(data.names) == 1:
-        fit = selection.growth.grown_again if len(rows) <= FEW_ROWS else selection.growth.refined
+        fit = growth.grown_again if len(rows) <= FEW_ROWS else growth.refined
     for number in range(HELD_OUT_EVERY):
         again, left = _left_out(
             best, compressor, force, used & (fold != number), used & (fold == number), fit
@@ -175,7 +179,7 @@ def _left_out(
     force: Float1D,
     fitted: NDArray[np.bool_],
     left: NDArray[np.bool_],
-    fit: Callable[[SeparableProblem, Basis], Solution] = SeparableProblem.solve,
+    fit: Fit = SeparableProblem.solve,
 ) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
     the positions and directions of these rows.

@@ -233,12 +233,12 @@ def weights_behind_turns(
 ) -> Float1D:
     """Returns the weight (n,) of each row in a fit, from 0 to 1.
 
-    Friction reverses behind a turn in a way that a model with a direction state follows only roughly, and the
-    direction of a row next to a turn is uncertain. The n rows that are as far behind the turns at one end share
-    this error, of variance v_s, besides an error of variance v: their weight is v / (v + n v_s). v + v_s is their
-    mean squared residual, and v that of rows as far before these turns: the other stroke, with the same
-    positions. A tool that leaves the object at one end shows walls and clicks near the other one, so that only
-    rows next to its turns are weighted.
+    Friction reverses behind a turn in a way that a model with a direction state follows only roughly, and
+    the direction of a row next to a turn is uncertain. The n rows that are as far behind the turns at one end
+    share this error, of variance v_s, besides an error of variance v. Their weight is v / (v + n v_s).
+    v + v_s is their mean squared residual. v is that of rows as far before these turns, which are of the
+    other stroke and have the same positions. A tool that leaves the object at one end shows walls and clicks
+    near the other one, so that only rows next to its turns are weighted.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def weights_behind_turns(
     def parts(turn: NDArray[np.intp], at_bottom: NDArray[np.bool_]) -> NDArray[np.intp]:
         """Returns the number of the end and of the distance (n,) of each row from the turn of its stroke."""
         distance = np.searchsorted(NEAR_TURN, np.abs(x - x[turn][stroke]))
-        return np.where(leaves & (distance >= near), FAR, distance) + (FAR + 1) * at_bottom
+        return np.asarray(np.where(leaves & (distance >= near), FAR, distance) + (FAR + 1) * at_bottom)
 
     behind, before = parts(begins, way), parts(ends, ~way)
     if not (far := behind % (FAR + 1) == FAR).any():

@@ -42,8 +42,8 @@ from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
 LEAST_GAIN = 0.25
-"""Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]: these
-forces are harder to render and to certify."""
+"""Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]:
+these forces are harder to render and to certify."""
 
 MOST_NOISE_ROWS = 50_000
 """Largest number of rows from which the noise where two models differ is computed; of more rows an evenly

@@ -284,7 +284,7 @@ def test_friction_that_creeps_in_pauses_gives_no_memory() -> None:
 
 
 def slipping(position: np.ndarray) -> np.ndarray:
-    """Returns the force of two springs that slip from stretches of 0.05 and 0.3 on, beside a soft spring."""
+    """Returns the force of two springs that slip from stretches of 0.05 and 0.3 on, and of a soft one."""
     return 0.5 * position + sum(
         k * (position - play(position, most, start=position[0])) for k, most in ((4.0, 0.05), (1.5, 0.3))
     )

@@ -283,7 +283,7 @@ def test_a_stated_direction_that_contradicts_the_order_of_one_stroke_is_kept() -
 
 
 def test_rows_behind_a_turn_have_the_weight_of_their_shared_error() -> None:
-    """Rows behind a turn that miss the force by 1 count less than one row, with noise of 0.01; the rows as far
+    """Rows behind a turn that miss the force by 1 count less than one row, with noise of 0.01; those as far
     before the turn count whole."""
     path, random = np.tile(IN_AND_OUT, 2) / 4.0, np.random.default_rng(0)
     order, touched = np.tile(SIDE, 2), np.ones(1600, dtype=bool)
