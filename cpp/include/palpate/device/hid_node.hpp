@@ -102,13 +102,9 @@ class Node {
             if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
                 return Received::Gone;
             }
-            const Nanoseconds left = deadline - monotonic_now();
-            if (left <= 0) {
+            if (!wait_until(deadline)) {
                 return Received::None;
             }
-            pollfd wait{file_, POLLIN, 0};
-            const timespec time{left / nanoseconds_a_second, left % nanoseconds_a_second};
-            (void)::ppoll(&wait, 1, &time, nullptr);
         }
         return Received::Gone;
     }
@@ -137,7 +133,19 @@ class Node {
     }
 
   private:
-    static constexpr int answer_ms = 500;  ///< longest wait for the answer of an emulated device [ms]
+    static constexpr Nanoseconds answer_wait = 500'000'000;  ///< longest wait for an emulated device [ns]
+
+    /// Waits until the node can be read. Returns false after the deadline.
+    [[nodiscard]] bool wait_until(Nanoseconds deadline) const noexcept {
+        const Nanoseconds left = deadline - monotonic_now();
+        if (left <= 0) {
+            return false;
+        }
+        pollfd wait{file_, POLLIN, 0};
+        const timespec time{left / nanoseconds_a_second, left % nanoseconds_a_second};
+        (void)::ppoll(&wait, 1, &time, nullptr);
+        return true;
+    }
 
     [[nodiscard]] std::string open_file(const std::string& path) {
         file_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
@@ -213,12 +221,12 @@ class Node {
         if (send(letter, content) != Written::Yes) {
             return 0;
         }
-        for (pollfd wait{file_, POLLIN, 0}; ::poll(&wait, 1, answer_ms) > 0;) {
+        for (const Nanoseconds deadline = monotonic_now() + answer_wait; wait_until(deadline);) {
             const ssize_t got = ::recv(file_, message_.data(), message_.size(), MSG_DONTWAIT);
-            if (got <= 0) {
+            if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
                 return 0;
             }
-            if (message_[0] == static_cast<std::uint8_t>(letter)) {
+            if (got > 0 && message_[0] == static_cast<std::uint8_t>(letter)) {
                 return static_cast<std::size_t>(got);
             }
         }
