@@ -169,10 +169,14 @@ struct TangentScene {
     return std::nullopt;
 }
 
+/// Controller of the scenes: it takes a line as position, force and stiffness, or as a spring about a center.
+enum class Takes { Lines, Springs };
+
 /// Makes a random scene with a delay of `delay` whole periods. `simple` leaves out the controller's own errors, rounding,
 /// encoder steps, jitter and lost commands. Returns nothing for a line that no damping certifies.
 [[nodiscard]] inline std::optional<TangentScene> random_tangent_scene(test::Random& random, double delay,
-                                                                      bool simple) {
+                                                                      bool simple,
+                                                                      Takes takes = Takes::Lines) {
     NetworkParameters network = test::random_network(random, 1 + random() % 3);
     TangentScene scene{ForceModel{network, test::unit_domain()}, {}, {}, 0};
     DeviceProfile& device = scene.device;
@@ -205,8 +209,12 @@ struct TangentScene {
     longest.jitter_s += scene.lost * device.period_s;
     longest.viscous_damping = longest.coulomb_friction = 1e6;
     scene.scheme.structure = StructureKind::Tangent;
+    constexpr unsigned constant = 2;
+    if (takes == Takes::Springs) {
+        loop.largest_center = longest.held_line->largest_center = 1e6;
+    }
     // Each rule occurs in scenes in which the plan would choose another one
-    switch (delay == 0.0 ? 0 : 1 + random() % 4) {
+    switch (takes == Takes::Springs ? constant : delay == 0.0 ? 0 : 1 + random() % 4) {
         case 0:
             scene.scheme.line = HeldSlope{SlopeRule::Steepest,
                                           bounds.rising() * (random() % 3 == 0 ? 0.5 : 1.0), 0.0, motion};
@@ -214,7 +222,7 @@ struct TangentScene {
         case 1:
             scene.scheme.line = HeldSlope{SlopeRule::Raised, 0.0, 0.0, std::nullopt};
             break;
-        case 2:
+        case constant:
             scene.scheme.line = detail::best_constant(bounds, longest);
             break;
         case 3:
@@ -264,6 +272,20 @@ struct TangentScene {
     grid.damping = damping * scene.device.viscous_damping / scene.device.period_s;
     grid.friction = friction * scene.device.coulomb_friction;
     return most_taken(grid) / (largest * motion + 1e-300);
+}
+
+/// Returns a command as the controller takes it: rounded, with a spring about the position without force if it takes
+/// springs.
+[[nodiscard]] inline Command as_taken(const Command& line, const DeviceProfile& device) {
+    const HeldLine& loop = *device.held_line;
+    const auto steps_of = [](double x, double step) { return step > 0.0 ? step * std::round(x / step) : x; };
+    const double stiffness = steps_of(line.stiffness, loop.stiffness_step);
+    if (loop.largest_center && stiffness > 0.0) {
+        return {0.0, steps_of(line.position - line.force / stiffness, loop.position_step), stiffness};
+    }
+    const double position = steps_of(line.position, loop.position_step);
+    return {steps_of(line.force + stiffness * (position - line.position), device.force_step), position,
+            stiffness};
 }
 
 /// A motion that repeats: in each period the handle moves at one or two constant speeds.
@@ -319,11 +341,8 @@ struct RepeatedMotion {
             structure.step(steps_of(x[static_cast<std::size_t>(sample)], device.encoder_step));
         Command line{rendered.force, rendered.environment_position, rendered.stiffness};
         (void)limit.apply(line);
-        const double stiffness = steps_of(line.stiffness, loop.stiffness_step);
-        const double position = steps_of(line.position, loop.position_step);
-        const double force = steps_of(line.force + stiffness * (position - line.position), device.force_step);
         if (k == 0 || !at(motion.lost, k)) {
-            sent.push_back({k == 0 ? 0 : sample + delay, {force, position, stiffness}});
+            sent.push_back({k == 0 ? 0 : sample + delay, as_taken(line, device)});
         }
     }
     const NetworkCurve& curve = scene.model.network()->curve();
@@ -422,7 +441,8 @@ struct RepeatedMotion {
 }
 
 inline std::ostream& operator<<(std::ostream& out, const TangentScene& scene) {
-    return out << name_of(scene.scheme.line->rule) << ", slope " << scene.scheme.line->slope << ", lift "
+    return out << (scene.device.held_line->largest_center ? "springs, " : "")
+               << name_of(scene.scheme.line->rule) << ", slope " << scene.scheme.line->slope << ", lift "
                << scene.scheme.line->lift << ", motion " << scene.scheme.line->motion.value_or(0.0)
                << ", delay " << scene.device.delay_s << " s, b " << scene.device.viscous_damping << ", f_c "
                << scene.device.coulomb_friction << ", lost " << scene.lost;

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "bindings.hpp"
 #include "fields.hpp"
 #include "palpate/device/device_profile.hpp"
+#include "palpate/device/hid_descriptor.hpp"
+#include "palpate/device/pid_reports.hpp"
 #include "palpate/device/wire.hpp"
 
 namespace palpate::bindings {
@@ -42,6 +45,17 @@ py::dict decode_model(const py::bytes& data) {
     return py::dict("fingerprint"_a = wire::fingerprint_text(model.fingerprint),
                     "certificate"_a = wire::fingerprint_text(model.certificate), "rate_hz"_a = model.rate_hz,
                     "is_rendered"_a = model.renderer == wire::Renderer::Device);
+}
+
+std::optional<bool> wheel_has_springs(const py::bytes& descriptor) {
+    const auto text = descriptor.cast<std::string>();
+    try {
+        return hid::pid::Layout{
+            hid::read_descriptor({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()})}
+            .has_springs();
+    } catch (const std::runtime_error&) {
+        return std::nullopt;
+    }
 }
 
 }  // namespace
@@ -96,6 +110,9 @@ void bind_device(py::module_& module) {
                "InputError with the wrong field.\n\n"
                "fingerprint and certificate (16 hexadecimal digits each), rate_hz (certified), is_rendered\n"
                "(now, by the device).");
+    module.def("wheel_has_springs", &wheel_has_springs, "descriptor"_a,
+               "Returns whether a force-feedback wheel with this report descriptor has springs; None if the\n"
+               "descriptor lacks a report that the adapter needs.");
     module.def("usb_cause", &wire::usb_cause, "code"_a,
                "Returns cause and cure for an error code of libusb; empty for a code without a text.");
     py::enum_<wire::Request>(

@@ -10,6 +10,7 @@ comment before a block changes this:
     <!-- first: COMMAND -->      runs this command before the block and shows nothing of it
     <!-- not run: REASON -->     does not run the block; the tests count these blocks
     <!-- needs: PROGRAM... -->   runs the block only if these programs are installed
+    <!-- virtual time: REASON --> runs palpate-control of the block with the clock of the tests, tests/clock
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import io
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -32,13 +34,14 @@ from typing import NamedTuple
 import once
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tests" / "clock"))
 DOCS = ROOT / "docs"
 PAGE_FOLDERS = ROOT / "build" / "docs" / "pages"
 """Folder of the folders in which the pages run"""
 REPOSITORY_FOLDERS = ("bench", "build", "cpp", "docs", "examples", "tests")
 """Folders that a command of a page may name, as if it ran in the repository"""
 _BLOCK = re.compile(
-    r"(?:^<!-- (?P<mark>first|not run|needs): (?P<words>[^\n]+) -->\n)?"
+    r"(?:^<!-- (?P<mark>first|not run|needs|virtual time): (?P<words>[^\n]+) -->\n)?"
     r"^```(?P<language>python|sh|cpp)\n(?P<code>.*?)^```\n",
     re.DOTALL | re.MULTILINE,
 )
@@ -56,6 +59,8 @@ class Block(NamedTuple):
     """Reason for which the block is not run; empty if it is run"""
     needs: tuple[str, ...]
     """Programs without which the block is not run"""
+    virtual_time: bool
+    """True if palpate-control waits for an emulated device in virtual time, however busy the machine is"""
     end: int
     """Place behind the block in the text of the page"""
 
@@ -71,6 +76,7 @@ def blocks(text: str) -> Iterator[Block]:
             words if mark == "first" else "",
             words if mark == "not run" else "",
             tuple(words.split()) if mark == "needs" else (),
+            mark == "virtual time",
             found.end(),
         )
 
@@ -151,7 +157,8 @@ def _run(block: Block, folder: Path, variables: dict[str, object]) -> str:
     if block.first:
         _command(["bash", "-euo", "pipefail", "-c", block.first])
     if block.language == "sh":
-        return _command(["bash", "-euo", "pipefail", "-c", block.code])
+        code = _virtual_time(folder) + block.code if block.virtual_time else block.code
+        return _command(["bash", "-euo", "pipefail", "-c", code])
     if block.language == "cpp":
         source, program = folder / f"line_{block.line}.cpp", folder / f"line_{block.line}"
         source.write_text(block.code, encoding="utf-8")
@@ -162,6 +169,22 @@ def _run(block: Block, folder: Path, variables: dict[str, object]) -> str:
     with contextlib.redirect_stdout(output):
         exec(compile(block.code, f"line {block.line}", "exec"), variables)
     return output.getvalue()
+
+
+def _virtual_time(folder: Path) -> str:
+    """Returns a command after which `palpate-control` runs in virtual time."""
+    from host_clock import host_clock
+
+    clock = host_clock()
+    program = folder / "virtual" / "palpate-control"
+    program.parent.mkdir(exist_ok=True)
+    program.write_text(
+        f"#!/bin/sh\nexport LD_PRELOAD={clock.name} LD_LIBRARY_PATH={shlex.quote(str(clock.parent))}\n"
+        f'exec {shlex.quote(str(ROOT / "build" / "control" / "palpate-control"))} "$@"\n',
+        encoding="utf-8",
+    )
+    program.chmod(0o755)
+    return f'PATH={shlex.quote(str(program.parent))}:"$PATH"\n'
 
 
 def _command(arguments: list[str]) -> str:

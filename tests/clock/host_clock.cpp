@@ -6,15 +6,18 @@
 // variable PALPATE_EMULATOR names its socket. No result depends on the speed of the computer, and a wait takes no real
 // time. Production code is unchanged: this library replaces the functions of the C library that read the clock or wait.
 //
-// Virtual time begins when the program locks its memory for a control loop, or when libusb or Boost.Asio creates a
-// timer. The timer fails, so that they compute their timeouts from this clock.
+// Virtual time begins when the program locks its memory for a control loop, when libusb or Boost.Asio creates a timer,
+// or when the program connects to the socket of an emulated drive. The timer fails, so that they compute their timeouts
+// from this clock.
 #include <dlfcn.h>
 #include <linux/futex.h>
+#include <linux/sockios.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -371,14 +374,35 @@ int poll(pollfd* files, nfds_t count, int timeout_ms) {
     return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
 }
 
+/// The socket of an emulated drive carries messages (SOCK_SEQPACKET).
+int connect(int file, const sockaddr* address, socklen_t size) {
+    const int code = REAL(connect)(file, address, size);
+    const int error = errno;
+    int type = 0;
+    socklen_t length = sizeof type;
+    if (code == 0 && address->sa_family == AF_UNIX &&
+        ::getsockopt(file, SOL_SOCKET, SO_TYPE, &type, &length) == 0 && type == SOCK_SEQPACKET) {
+        HostClock::get().start();
+    }
+    errno = error;
+    return code;
+}
+
 /// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. If none
-/// arrives within a second of real time, the virtual time of the wait passes.
+/// arrives within a second of real time after the drive has read the message, the virtual time of the wait passes.
 int ppoll(pollfd* files, nfds_t count, const timespec* timeout, const sigset_t* mask) {
     if (!is_virtual() || timeout == nullptr) {
         return REAL(ppoll)(files, count, timeout, mask);
     }
     constexpr timespec patience{1, 0};
-    const int ready = REAL(ppoll)(files, count, &patience, mask);
+    const auto is_unread = [](const pollfd& file) {
+        int bytes = 0;
+        return ::ioctl(file.fd, SIOCOUTQ, &bytes) == 0 && bytes > 0;
+    };
+    int ready = REAL(ppoll)(files, count, &patience, mask);
+    while (ready == 0 && std::any_of(files, files + count, is_unread)) {
+        ready = REAL(ppoll)(files, count, &patience, mask);
+    }
     if (ready == 0) {
         HostClock::get().sleep(of(*timeout) + now);
     }

@@ -72,6 +72,34 @@ def test_a_failing_block_is_reported_with_page_and_line(tmp_path: Path) -> None:
         page_code.run_page(page, tmp_path / "folder")
 
 
+BUSY = """
+```sh
+python tests/python/mit_drive.py bus.sock > drive.txt 2>&1 &
+drive=$!
+trap "kill -KILL $drive" EXIT
+while [ ! -S bus.sock ]; do sleep 0.1; done
+kill -STOP $drive
+(sleep 1; kill -CONT $drive) &
+palpate-control tests/models/good/spring.json --device mit:./bus.sock:1:damiao-4310 --uncertified \\
+    --duration-s 0.1 --frozen-s 0
+```
+"""
+"""The emulated drive does not run for a second, as on a busy machine."""
+
+
+@pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
+def test_an_emulated_drive_answers_a_block_in_virtual_time_however_busy_the_machine_is(
+    tmp_path: Path,
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(BUSY, encoding="utf-8")
+    with pytest.raises(SystemExit, match="does not answer"):
+        page_code.run_page(page, tmp_path / "real")
+    page.write_text(f"<!-- virtual time: busy -->{BUSY}", encoding="utf-8")
+    (output,) = page_code.run_page(page, tmp_path / "virtual")
+    assert "100 ticks" in output
+
+
 def test_code_runs_again_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, runs = tmp_path / "result.json", []
 

@@ -71,7 +71,7 @@ def main() -> None:
     for kind in range(24):
         write("exported_model", str(kind), exported(kind))
     state = {"cursor_position": FORCE, "cursor_velocity": FORCE, "current_cursor_force": FORCE}
-    filters = {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.1}}
+    filters = {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.1, "vector": FORCE}}
     device = {
         "device_id": "049D",
         "config": {"type": "inverse3", "filters": filters},

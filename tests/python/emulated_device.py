@@ -23,10 +23,12 @@ _Device = TypeVar("_Device", bound=Served)
 
 
 def _listening(path: Path) -> socket.socket:
-    """Returns a listening socket of this name."""
+    """Returns a listening socket of this name, which exists only after the socket accepts connections."""
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listening.bind(str(path))
+    early = path.with_suffix(".new")
+    listening.bind(str(early))
     listening.listen()
+    early.rename(path)
     return listening
 
 

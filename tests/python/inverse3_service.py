@@ -37,9 +37,14 @@ class Service:
     device_id: str = "049D"
     calibrated: bool = True
     force_key: str = "vector"
-    force_gate: float = 0.3
-    added_damping: float = 0.5
-    """Settings by which the service changes forces"""
+    axis: str = "z"
+    """Axis along which the hand moves the handle"""
+    force_gate: float | None = 0.3
+    added_damping: float | None = 0.5
+    directional_damping: dict[str, float] | None = None
+    """Filters by which the service changes forces, until the first message sets them; None: not reported"""
+    unknown: frozenset[str] = frozenset()
+    """Keys of published messages that the service does not know"""
     mass: float = 0.2
     damping: float = 2.0
     hand_stiffness: float = 200.0
@@ -88,7 +93,11 @@ class Service:
         number = self._number
         message = json.loads(text)
         self.messages.append(message)
-        command = message["inverse3"][0]["commands"]["set_cursor_force"]
+        (device,) = message["inverse3"]
+        if device["device_id"] == self.device_id:
+            self._configure(device.get("configure", {}))
+        full = "force_render_full_state" in message.get("session", {}).keys() - self.unknown
+        command = device["commands"]["set_cursor_force"]
         force = command.get(self.force_key, {"x": 0.0, "y": 0.0, "z": 0.0})
         self.forces.append(force)
         self.times.append(self.now)
@@ -97,7 +106,7 @@ class Service:
         lead = 0.5 * self.sweep * (1.0 - math.cos(2.0 * math.pi * number * STEP_S))
         hand = self.hand_stiffness * (self.start + lead - self._position)
         for _ in range(10):
-            push = hand + force["z"] - self.damping * self._velocity
+            push = hand + force[self.axis] - self.damping * self._velocity
             self._velocity += 0.1 * STEP_S * push / self.mass
             self._position += 0.1 * STEP_S * self._velocity
         self.positions.append(self._position)
@@ -115,31 +124,45 @@ class Service:
         late = self.late_answers.get(number, 0)
         if late is not None:
             self.answered[number] = self.now + late
-            yield late, json.dumps(self.state_message(force, unplugged=unplugged))
+            yield late, json.dumps(self.state_message(force, with_config=full, unplugged=unplugged))
+
+    def _configure(self, settings: dict[str, Any]) -> None:
+        known = settings.keys() - self.unknown
+        if "force_gate" in known:
+            self.force_gate = settings["force_gate"]["gain"]
+        if "damping" in known:
+            damping = settings["damping"]
+            self.added_damping = damping.get("scalar", self.added_damping)
+            if "vector" in damping.keys() - self.unknown:
+                self.directional_damping = damping["vector"]
 
     def state_message(
         self, force: dict[str, float], *, with_config: bool = False, unplugged: bool = False
     ) -> dict[str, Any]:
-        zero_force = {"x": 0.0, "y": 0.0, "z": 0.0}
+        zero = {"x": 0.0, "y": 0.0, "z": 0.0}
         device: dict[str, Any] = {
             "device_id": self.device_id,
             "state": {
-                "cursor_position": {"x": 0.01, "y": -0.12, "z": self._position},
-                "cursor_velocity": {"x": 0.0, "y": 0.0, "z": self._velocity},
-                "current_cursor_force": {**zero_force, **force},
+                "cursor_position": {"x": 0.01, "y": -0.12, "z": 0.1, self.axis: self._position},
+                "cursor_velocity": {**zero, self.axis: self._velocity},
+                "current_cursor_force": {**zero, **force},
                 "control_domain": "cartesian",
                 "control_mode": "force" if force else "idle",
             },
             "status": {"calibrated": self.calibrated},
         }
         if with_config:
+            filters: dict[str, Any] = {}
+            if self.force_gate is not None:
+                filters["force_gate"] = {"gain": self.force_gate}
+            if self.added_damping is not None:
+                filters["damping"] = {"scalar": self.added_damping}
+            if self.directional_damping is not None:
+                filters["damping"] = {**filters.get("damping", {}), "vector": self.directional_damping}
             device["config"] = {
                 "type": "inverse3",
                 "device_info": {"major_version": 7, "minor_version": 4, "id": "049D"},
-                "filters": {
-                    "force_gate": {"gain": self.force_gate},
-                    "damping": {"scalar": self.added_damping},
-                },
+                "filters": filters,
             }
         return {"inverse3": [] if unplugged else [device] * self.devices}
 

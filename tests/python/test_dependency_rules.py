@@ -55,6 +55,7 @@ INCLUDES = {
 OPTIONAL_HEADERS = {
     "device/can_bus.hpp",
     "device/can_motor.hpp",
+    "device/detail/packet_socket.hpp",
     "device/detail/usb_connection.hpp",
     "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",

@@ -4,7 +4,7 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['AdmittanceDisplay', 'DeviceProfile', 'HeldLine', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['AdmittanceDisplay', 'DeviceProfile', 'HeldLine', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor', 'wheel_has_springs']
 class OnDevice:
     """
     Timing of a model that runs on the motor controller of a device, in SI units.
@@ -381,6 +381,11 @@ def on_device(profile: DeviceProfile, rate_hz: typing.SupportsFloat | typing.Sup
 def usb_cause(code: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
     Returns cause and cure for an error code of libusb; empty for a code without a text.
+    """
+def wheel_has_springs(descriptor: bytes) -> bool | None:
+    """
+    Returns whether a force-feedback wheel with this report descriptor has springs; None if the
+    descriptor lacks a report that the adapter needs.
     """
 longest_watchdog_ms: int = 1000
 shortest_watchdog_ms: int = 2

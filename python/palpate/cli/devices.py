@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate devices: lists USB devices, sets one up, and installs the udev rule."""
+"""palpate devices: lists USB devices and wheels, sets up a USB device, and installs the udev rule."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from .._core.device import longest_watchdog_ms, shortest_watchdog_ms
 from .._core.run import device_help
-from ..devices import DeviceError, Found, find_devices, install_rule, open_usb
+from ..devices import DeviceError, Found, Wheel, find_devices, find_wheels, install_rule, open_usb
 from ..errors import InputError
 from ..verdict import GOOD, Verdict, no, usable
 from .exit_status import WorkError, end_with
@@ -57,12 +57,14 @@ def devices(
             return
         if disable or clear or zero or watchdog_ms is not None:
             _set_up(device, disable=disable, clear=clear, zero=zero, watchdog_ms=watchdog_ms)
-        found = find_devices()
+        wheels = find_wheels()
+        found = _on_usb(wheels)
     except DeviceError as error:
         raise WorkError(str(error)) from None
-    verdict = _verdict(found)
+    verdict = _verdict(found, wheels)
     if as_json:
-        print_json({"verdict": str(verdict), "devices": [asdict(one) for one in found]})
+        listed = [asdict(wheel) | {"device": wheel.device} for wheel in wheels]
+        print_json({"verdict": str(verdict), "devices": [asdict(one) for one in found], "wheels": listed})
         end_with(verdict)
         return
     print_verdict(verdict)
@@ -91,16 +93,32 @@ def devices(
                 f"certificate {one.model['certificate']}, certified for "
                 f"{one.model['rate_hz']} Hz{', rendered now' if one.model['is_rendered'] else ''}"
             )
+    for wheel in wheels:
+        print_line(f"{wheel.name or 'without a name'} ({wheel.node})")
+        print_line(f"  {wheel.problem}" if wheel.problem else f"  --device {wheel.device}")
+        print_line(f"  force-feedback wheel; springs: {'yes' if wheel.springs else 'no'}")
     end_with(verdict)
 
 
-def _verdict(found: Sequence[Found]) -> Verdict:
+def _on_usb(wheels: Sequence[Wheel]) -> list[Found]:
+    """Returns the USB devices; a wheel needs neither pyusb nor libusb."""
+    try:
+        return find_devices()
+    except DeviceError as error:
+        if not wheels:
+            raise
+        talk(str(error))
+        return []
+
+
+def _verdict(found: Sequence[Found], wheels: Sequence[Wheel]) -> Verdict:
     """Returns a verdict: good if all found devices can be used, no if none can; usable if none is found."""
     problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
-    if not found:
+    problems += [f"{wheel.name or wheel.node}: {wheel.problem}" for wheel in wheels if wheel.problem]
+    if not found and not wheels:
         none_found = "no haptic USB device is plugged in; record and render need none with --device simulated"
         return Verdict((usable(none_found),))
-    judge = no if len(problems) == len(found) else usable
+    judge = no if len(problems) == len(found) + len(wheels) else usable
     return Verdict(tuple(judge(problem) for problem in problems))
 
 

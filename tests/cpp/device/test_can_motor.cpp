@@ -410,7 +410,7 @@ TEST(MitDevice, ADriveThatDiffersFromItsPresetIsRefused) {
 TEST(CanBus, AnInterfaceOrASocketThatDoesNotExistIsRefusedWithTheCure) {
     CanBus bus;
     EXPECT_NE(bus.open("can99").reason.find("there is no CAN interface can99: 'ip link'"), std::string::npos);
-    EXPECT_NE(bus.open("/nowhere/bus").reason.find("start the emulated drive first"), std::string::npos);
+    EXPECT_NE(bus.open("/nowhere/bus").reason.find("start the emulated device first"), std::string::npos);
     EXPECT_NE(bus.open("/" + std::string(200, 'x')).reason.find("use a shorter one"), std::string::npos);
     canfd_frame frame{};
     EXPECT_EQ(bus.send(frame), Sent::Down);

@@ -30,6 +30,8 @@ TEST(DeviceProfile, RefusesInvalidValuesByName) {
     EXPECT_NE(refusal([](DeviceProfile& p) { p.viscous_damping = -1.0; }), "accepted");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.on_device = OnDevice{.delay_s = -1.0}; }),
               "device profile: on_device.delay_s is -1, must be >= 0");
+    EXPECT_EQ(refusal([](DeviceProfile& p) { p.held_line = HeldLine{.largest_center = 0.0}; }),
+              "device profile: held_line.largest_center is 0, must be > 0");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.renderer = "phone"; }),
               "device profile: renderer is 'phone', must be device");
 }

@@ -152,8 +152,8 @@ TEST(HeldLineDevice, OfSpringsRoundsTheCenterInsideItsRange) {
         HeldLine{.period_s = 5e-5, .delay_s = 0.0, .position_step = 0.1, .largest_center = 0.3};
     SimulatedHandle<Hand, SemiImplicitEuler> device{profile, {}, 20, 0.5};
     (void)device.open();
-    (void)device.exchange({2.0, 0.5, 8.0});  // zero force at 0.25, rounded to 0.3
-    EXPECT_NEAR(device.applied_force(), 8.0 * (device.handle_position() - 0.3), 0.02);
+    (void)device.exchange({1.48, 0.5, 4.0});  // zero force at 0.13, rounded to 0.1
+    EXPECT_NEAR(device.applied_force(), 4.0 * (device.handle_position() - 0.1), 0.02);
     (void)device.exchange({-2.0, 0.5, 8.0});  // zero force at 0.75, outside of the range
     EXPECT_NEAR(device.applied_force(), 8.0 * (device.handle_position() - 0.3), 0.05);
     (void)device.exchange({0.4, 0.5, 0.0});

@@ -55,37 +55,49 @@ def render_on_service(
         yield control(model, *device, *arguments, env=running_service.environment), running_service
 
 
-def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_spring_is_rendered_along_one_axis_against_the_displacement(
+    axis: str, spring: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "rendered.csv"
     arguments = ["--structure", "direct", "--duration-s", 1, "--record", out, "--json"]
-    with render_on_service(spring, *arguments) as (completed, service):
+    with render_on_service(spring, *arguments, axis=f":{axis}", service=Service(axis=axis)) as (
+        completed,
+        service,
+    ):
         assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
-    assert summary["inverse3"] == {"force_gate": 0.3, "damping": 0.5, "skipped_states": 0}
-    assert "(the service's force gate 0.3, damping 0.5), uncertified, at 1000 Hz" in completed.stderr
+    assert summary["inverse3"] == {"force_gate": 0.0, "damping": 0.0, "skipped_states": 0}
+    assert "(the service's force gate 0, damping 0), uncertified, at 1000 Hz" in completed.stderr
     recording = read_recording(out)
     assert recording.units == {"position": "m", "force": "N"}
-    assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
+    assert recording.metadata["service"] == "force gate 0, damping 0"
     assert recording.position.max() > 0.003
     after_ramp = slice(300, None)
     expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no force below position 0
     assert recording.force[after_ramp] == pytest.approx(expected_force, abs=1e-6)
     # The sent force has a component along the axis only, points out of the object, and is zero at the end.
-    assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
-    assert min(force["z"] for force in service.forces) < -0.2
-    assert service.forces[-1]["z"] == 0.0
+    assert all(force[other] == 0.0 for force in service.forces for other in set("xyz") - {axis})
+    assert min(force[axis] for force in service.forces) < -0.2
+    assert service.forces[-1][axis] == 0.0
     assert service.closed
 
 
-def test_only_the_first_message_names_the_program_and_it_sends_zero_force(spring: Path) -> None:
+def test_the_first_two_messages_set_the_filters_and_request_them_with_zero_force(spring: Path) -> None:
     with render_on_service(spring, "--duration-s", 0.1, "--json") as (completed, service):
         assert completed.returncode == 0, completed.stderr
     ticks = json.loads(completed.stdout)["ticks"]
-    first_message, *later_messages = service.messages
-    assert first_message["session"] == {"configure": {"profile": {"name": "palpate"}}}
-    assert first_message["inverse3"][0]["device_id"] == "049D"
-    assert service.forces[0] == {"x": 0.0, "y": 0.0, "z": 0.0}
+    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+    command = {"device_id": "049D", "commands": {"set_cursor_force": {"vector": zero}}}
+    filters = {"force_gate": {"gain": 0.0}, "damping": {"scalar": 0.0, "vector": zero}}
+    first_message, second_message, *later_messages = service.messages
+    assert first_message == {
+        "session": {"configure": {"profile": {"name": "palpate"}}},
+        "inverse3": [{**command, "configure": filters}],
+    }
+    assert second_message == {"session": {"force_render_full_state": {}}, "inverse3": [command]}
     assert all(set(message) == {"inverse3"} for message in later_messages)
+    assert all(set(message["inverse3"][0]) == {"device_id", "commands"} for message in later_messages)
     assert (
         ticks <= len(later_messages) <= ticks + 3
     )  # the program sends one message each tick, one before them, and at the end two more with zero force
@@ -177,7 +189,7 @@ def certified(folder: Path, spring: Path, delay_s: float) -> Path:
 def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, tmp_path: Path) -> None:
     # The service answers within the period, but the loop sends the force of a state one period after it.
     model = certified(tmp_path, spring, delay_s=0.5e-3)
-    with serving(Service(force_gate=0.0, added_damping=0.0)) as service:
+    with serving(Service()) as service:
         completed = control(model, "--device", f"inverse3:z@{service.port}", env=service.environment)
     assert completed.returncode == 1
     assert "stopped because the device applied a force" in completed.stderr
@@ -185,17 +197,43 @@ def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, 
     assert service.forces[-1]["z"] == 0.0
 
 
-@pytest.mark.parametrize("settings", [{"force_gate": 0.0}, {"added_damping": 0.0}])
-def test_a_certified_run_is_refused_if_the_service_changes_forces(
-    settings: dict[str, float], spring: Path, tmp_path: Path
+def unknown(*keys: str, **filters: Any) -> Service:
+    """Returns a service that ignores keys of the messages, as versions before 3.5 do."""
+    return Service(unknown=frozenset(keys), **filters)
+
+
+IGNORED = [
+    (unknown("force_gate"), "force gate 0.3, damping 0"),
+    (unknown("damping"), "force gate 0, damping 0.5"),
+    (unknown("damping", added_damping=-0.5), "force gate 0, damping 0.5"),
+    (unknown("vector", directional_damping={"x": 0.0, "y": -2.0, "z": 0.0}), "force gate 0, damping 2"),
+    (unknown("force_render_full_state"), "force gate not given, damping not given"),
+    (unknown("force_gate", force_gate=None), "force gate not given, damping 0"),
+    (unknown("damping", added_damping=None), "force gate 0, damping not given"),
+]
+
+
+@pytest.mark.parametrize(("service", "reported"), IGNORED)
+def test_a_certified_run_is_refused_unless_the_service_reports_that_its_filters_are_off(
+    service: Service, reported: str, spring: Path, tmp_path: Path
 ) -> None:
     model = certified(tmp_path, spring, delay_s=2e-3)
-    with serving(Service(**settings)) as service:  # type: ignore[arg-type]
+    with serving(service):
         completed = control(model, "--device", f"inverse3:z@{service.port}", env=service.environment)
     assert completed.returncode == 2
-    assert "the Inverse Service changes forces (force gate" in completed.stderr
-    assert "set both to 0 in its settings, or set uncertified" in completed.stderr
-    assert all(force["z"] == 0.0 for force in service.forces)
+    assert f"the Inverse Service reports {reported} after this program set both to 0" in completed.stderr
+    assert "install version 3.5 or newer of the service and close programs that set its filters, or set" in (
+        completed.stderr
+    )
+    assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)
+
+
+def test_an_uncertified_run_states_the_filters_that_the_service_keeps(spring: Path) -> None:
+    service = unknown("force_gate", "damping", added_damping=None)
+    with render_on_service(spring, "--duration-s", 0.1, "--json", service=service) as (completed, _):
+        assert completed.returncode == 0, completed.stderr
+    assert "(the service's force gate 0.3, damping not given), uncertified" in completed.stderr
+    assert json.loads(completed.stdout)["inverse3"]["damping"] is None
 
 
 def largest_delay(service: Service, last: int) -> int:
@@ -223,7 +261,7 @@ def test_random_faults_of_the_service_make_no_force_older_than_certified(
     ends = Counter[str]()
     ticks = 0
     for run in range(20 if SCALE == 1 else 60 * SCALE):
-        service = Service(mass=0.02, sweep=0.02, force_gate=0.0, added_damping=0.0)
+        service = Service(mass=0.02, sweep=0.02)
         first = int(generator.integers(FIRST_FAULT, 480))
         for number in range(first, first + int(generator.integers(1, 4))):
             kind, length = generator.choice(["late", "lost", "burst", "extra"]), int(generator.integers(1, 8))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import random
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from conftest import ROOT
@@ -30,6 +32,7 @@ DEGREES = 180
 TORQUE = Wheel().full_torque
 STIFFNESS = Wheel().stiffness
 STEP = 0.5 * math.radians(DEGREES) / TOP
+SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
 def name(node: Path, *, springs: bool = True) -> str:
@@ -182,6 +185,32 @@ def test_a_planned_spring_is_rendered_recorded_and_identified_again(
     x = np.linspace(settled["position_rad"].min(), settled["position_rad"].max(), 100)
     assert np.abs(again.force(x) - spring().force(x)).max() < 0.02 * np.ptp(spring().force(x))
     assert verify(again, recording).verdict.level != "no"
+
+
+@pytest.mark.full
+@needs_program
+def test_a_soak_of_a_certified_line_answers_and_records_every_command(
+    planned: Path, node: Path, tmp_path: Path
+) -> None:
+    seconds = 3 * SCALE
+    record = tmp_path / "soak.csv"
+    words = ["--wait-ms", 0.5, "--json", "--duration-s", seconds, "--record", record]
+    with emulated(node, Wheel(period_s=PERIOD_S)) as wheel:
+        ran = control(planned, "--device", name(node), *words, timeout=100.0 + 10.0 * seconds)
+    assert ran.returncode == 0, ran.stderr
+    summary = json.loads(ran.stdout)
+    ticks = round(seconds / PERIOD_S)
+    assert summary["ticks"] == summary["recorded"] == ticks
+    assert wheel.forces >= ticks
+    counters = summary["wheel"]
+    assert counters["malformed"] == counters["unsent"] == counters["two_reports"] == 0
+    rows = pd.read_csv(record, comment="#", usecols=["time_s", "status"])
+    statuses = rows["status"].value_counts()
+    print(f"{ticks} ticks: {dict(statuses)}")
+    assert set(statuses.index) <= {"Ok", "Ramp"}
+    assert statuses["Ramp"] <= 0.5 / PERIOD_S
+    assert not wheel.enabled
+    assert not wheel.effects
 
 
 @needs_program

@@ -5,12 +5,9 @@
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <net/if.h>
-#include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +16,7 @@
 #include <system_error>
 #include <utility>
 
+#include "palpate/device/detail/packet_socket.hpp"
 #include "palpate/device/device.hpp"
 #include "palpate/realtime/periodic.hpp"
 
@@ -51,7 +49,11 @@ class CanBus {
         close();
         is_off_ = false;
         const bool is_path = name.find('/') != std::string::npos;
-        return {is_path ? open_path(name) : open_interface(name)};
+        std::string reason = is_path ? detail::connect_to_emulator(name, socket_) : open_interface(name);
+        if (!reason.empty()) {
+            close();
+        }
+        return {reason};
     }
 
     void close() noexcept {
@@ -90,13 +92,9 @@ class CanBus {
                 is_off_ = true;  // a closed socket, or an interface that is down
                 return false;
             }
-            const Nanoseconds left = deadline - monotonic_now();
-            if (left <= 0) {
+            if (!detail::wait_to_read(socket_, deadline)) {
                 return false;
             }
-            pollfd wait{socket_, POLLIN, 0};
-            const timespec time{left / nanoseconds_a_second, left % nanoseconds_a_second};
-            (void)::ppoll(&wait, 1, &time, nullptr);
         }
         return false;
     }
@@ -128,26 +126,7 @@ class CanBus {
         address.can_family = AF_CAN;
         address.can_ifindex = static_cast<int>(index);
         if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-            const std::string reason = failure(name, "start it with 'ip link set " + name + " up'");
-            close();
-            return reason;
-        }
-        return "";
-    }
-
-    [[nodiscard]] std::string open_path(const std::string& name) {
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        if (name.size() >= sizeof address.sun_path) {
-            return "the path of the socket " + name + " is too long: use a shorter one";
-        }
-        std::copy(name.begin(), name.end(), static_cast<char*>(address.sun_path));
-        socket_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-        if (socket_ < 0 ||
-            ::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-            const std::string reason = failure(name, "start the emulated drive first");
-            close();
-            return reason;
+            return failure(name, "start it with 'ip link set " + name + " up'");
         }
         return "";
     }

@@ -3,12 +3,10 @@
 
 #include <fcntl.h>
 #include <linux/hidraw.h>
-#include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/device/detail/packet_socket.hpp"
 #include "palpate/device/device.hpp"
 #include "palpate/realtime/periodic.hpp"
 
@@ -58,7 +57,7 @@ class Node {
         close();
         struct stat info{};
         is_socket_ = ::stat(path.c_str(), &info) == 0 && S_ISSOCK(info.st_mode);
-        std::string reason = is_socket_ ? connect(path) : open_file(path);
+        std::string reason = is_socket_ ? palpate::detail::connect_to_emulator(path, file_) : open_file(path);
         if (reason.empty() && !read_descriptor()) {
             reason = path + ": " + std::generic_category().message(errno) +
                      "; choose the hidraw node of a wheel, 'ls /dev/hidraw*' lists the nodes";
@@ -102,13 +101,9 @@ class Node {
             if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
                 return Received::Gone;
             }
-            const Nanoseconds left = deadline - monotonic_now();
-            if (left <= 0) {
+            if (!palpate::detail::wait_to_read(file_, deadline)) {
                 return Received::None;
             }
-            pollfd wait{file_, POLLIN, 0};
-            const timespec time{left / nanoseconds_a_second, left % nanoseconds_a_second};
-            (void)::ppoll(&wait, 1, &time, nullptr);
         }
         return Received::Gone;
     }
@@ -137,7 +132,7 @@ class Node {
     }
 
   private:
-    static constexpr int answer_ms = 500;  ///< longest wait for the answer of an emulated device [ms]
+    static constexpr Nanoseconds answer_wait = 500'000'000;  ///< longest wait for an emulated device [ns]
 
     [[nodiscard]] std::string open_file(const std::string& path) {
         file_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
@@ -149,20 +144,6 @@ class Node {
         }
         if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
             return path + " is used by another program: end that program first";
-        }
-        return "";
-    }
-
-    [[nodiscard]] std::string connect(const std::string& path) {
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        if (path.size() >= sizeof address.sun_path) {
-            return "the path of the socket " + path + " is too long: use a shorter one";
-        }
-        std::copy(path.begin(), path.end(), static_cast<char*>(address.sun_path));
-        file_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-        if (file_ < 0 || ::connect(file_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-            return path + ": " + std::generic_category().message(errno) + "; start the emulated wheel first";
         }
         return "";
     }
@@ -213,12 +194,13 @@ class Node {
         if (send(letter, content) != Written::Yes) {
             return 0;
         }
-        for (pollfd wait{file_, POLLIN, 0}; ::poll(&wait, 1, answer_ms) > 0;) {
+        for (const Nanoseconds deadline = monotonic_now() + answer_wait;
+             palpate::detail::wait_to_read(file_, deadline);) {
             const ssize_t got = ::recv(file_, message_.data(), message_.size(), MSG_DONTWAIT);
-            if (got <= 0) {
+            if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
                 return 0;
             }
-            if (message_[0] == static_cast<std::uint8_t>(letter)) {
+            if (got > 0 && message_[0] == static_cast<std::uint8_t>(letter)) {
                 return static_cast<std::size_t>(got);
             }
         }

@@ -42,7 +42,7 @@ struct Inverse3Settings {
 /// same messages.
 ///
 /// The documentation of version 3.5 defines (docs.haply.co/inverseSDK/service: "WebSocket Protocol", "Control
-/// Commands", "Common Types", "JSON Conventions", "Filters", tutorials 01 and 05):
+/// Commands", "Common Types", "JSON Conventions", "Device Configuration", "Filters", tutorials 01 and 05):
 /// - ws://localhost:10001. On connection the service sends every device with config, state and status. After that it
 ///   sends one message with the device's state for each received message, so the host sets the rate of the loop.
 /// - inverse3[].device_id; state.cursor_position in m, cursor_velocity in m/s, current_cursor_force in N, each {x, y,
@@ -50,9 +50,12 @@ struct Inverse3Settings {
 /// - inverse3[].commands.set_cursor_force.vector in N. Each command acts once; if the host sends no more
 ///   commands, the device makes no force.
 ///   session.configure.profile.name is in the first message only.
-/// - config.filters.force_gate.gain and .damping.scalar. The service applies both filters and a global scale to forces.
+/// - inverse3[].configure.force_gate.gain, .damping.scalar and .damping.vector set two filters of forces for the
+///   session. session.force_render_full_state requests one answer with config.filters, which `open` reads back. An
+///   automatic reduction of forces at oscillations and a global scale of forces cannot be set for a session.
 ///
-/// Older versions of the service name the vector `values` and ignore unknown keys. If the received state shows zero
+/// Joint torques (set_angular_torques) are not used: a force along one axis needs the kinematics of the arm, which are
+/// not published. Older versions of the service name the vector `values` and ignore unknown keys. If the received state shows zero
 /// force for more than 200 consecutive commands of a force, the exchange therefore returns the status Fault.
 ///
 /// Position 0 is the position of the handle on opening. The service does not send its time, so device_time is the
@@ -68,14 +71,13 @@ class Inverse3Device {
   public:
     explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
 
-    /// Connects to the service, chooses the device and reads its position.
+    /// Connects to the service, chooses the device, sets its filters of forces to 0 and reads them and the position.
     Opened open() {
         link_ = std::make_unique<Link>();
         const std::string service = settings_.host + ":" + std::to_string(settings_.port);
         try {
             connect(service);
             info_ = read_inverse3_inventory(received(service, "reports no device"), service);
-            link_->command_head = inverse3_command_head(info_.id);
             begin_session(service);
         } catch (const nlohmann::json::exception& error) {
             link_.reset();
@@ -249,20 +251,29 @@ class Inverse3Device {
         return text;
     }
 
-    /// Sends the first message: the name of this program and a command of zero force. Takes the start position of the
-    /// handle from the answer.
+    /// Sends the name of this program and the filters, then a request of the configuration, each with zero force. Takes
+    /// the filters and the start position of the handle from the last answer.
     void begin_session(const std::string& service) {
-        write_message(0.0, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
-        Error error;
-        link_->sent = Clock::now();
-        link_->stream.write(boost::asio::buffer(link_->message), error);
-        link_->newest_message = received(service, "does not answer a command");
+        link_->command_head = inverse3_command_head(info_.id, inverse3_without_filters);
+        request(service, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
+        link_->command_head = inverse3_command_head(info_.id);
+        request(service, R"({"session":{"force_render_full_state":{}},)");
+        read_inverse3_filters(link_->newest_message, info_);
         link_->late_from = link_->late_from_before = link_->sent;
         read_state();
         link_->origin = link_->state.position;
         last_ = {};
         skipped_states_ = 0;
         link_->receive();
+    }
+
+    /// Sends a message with zero force and waits for the answer, while the device is being opened.
+    void request(const std::string& service, const char* head) {
+        write_message(0.0, head);
+        Error error;
+        link_->sent = Clock::now();
+        link_->stream.write(boost::asio::buffer(link_->message), error);
+        link_->newest_message = received(service, "does not answer a command");
     }
 
     /// Writes a command with this force as the next message to the service.

@@ -43,8 +43,8 @@ inline constexpr std::array transports{
         "a force-feedback wheel (USB class PID) on a NODE such as /dev/hidraw0: DEGREES from end to end, "
         "TORQUE in N*m of its full force, STIFFNESS in N*m/rad of its full spring",
         true, 1e-3},
-    Transport{"inverse3", "inverse3[:AXIS[@PORT]]", "AXIS is x, y, z, -x, -y or -z, PORT that of its service",
-              false, 20e-3},
+    Transport{"inverse3", "inverse3[:AXIS[@PORT]]",
+              "AXIS is x, y, z (default), -x, -y or -z, PORT that of its service", false, 20e-3},
 };
 
 /// Returns the parts of the name of a device, which colons separate.

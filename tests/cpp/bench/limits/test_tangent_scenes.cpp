@@ -16,15 +16,17 @@ namespace {
 
 constexpr double rounding = 1e-7;
 
-TangentScene scene_of(test::Random& random, double delay, bool simple) {
+TangentScene scene_of(test::Random& random, double delay, bool simple, Takes takes) {
     std::optional<TangentScene> scene;
     while (!scene) {
-        scene = random_tangent_scene(random, delay, simple);
+        scene = random_tangent_scene(random, delay, simple, takes);
     }
     return *scene;
 }
 
-TEST(TangentSearch, TakesNoEnergyOutOfCertifiedScenes) {
+class TangentSearch : public testing::TestWithParam<Takes> {};
+
+TEST_P(TangentSearch, TakesNoEnergyOutOfCertifiedScenes) {
     int found_below = 0;
     for (int k = 0; k < test::cases(3); ++k) {
         for (const double delay : {0.0, 0.4, 1.0, 2.0}) {
@@ -34,7 +36,7 @@ TEST(TangentSearch, TakesNoEnergyOutOfCertifiedScenes) {
                 }
                 test::Random random{static_cast<std::uint64_t>(1000 * k) +
                                     static_cast<std::uint64_t>(10 * delay)};
-                const TangentScene scene = scene_of(random, delay, simple);
+                const TangentScene scene = scene_of(random, delay, simple, GetParam());
                 const auto search = [&](double share) {
                     test::Random same = random;
                     return simple ? search_by_value(scene, same, share, share)
@@ -46,6 +48,26 @@ TEST(TangentSearch, TakesNoEnergyOutOfCertifiedScenes) {
         }
     }
     EXPECT_GE(found_below, 2) << "the search must find energy below the certified values";
+}
+
+INSTANTIATE_TEST_SUITE_P(Controllers, TangentSearch, testing::Values(Takes::Lines, Takes::Springs),
+                         [](const auto& kind) { return kind.param == Takes::Lines ? "lines" : "springs"; });
+
+TEST(TangentScene, ASpringIsRoundedByItsCenter) {
+    DeviceProfile device;
+    device.force_step = 0.1;
+    HeldLine& loop = device.held_line.emplace();
+    loop.stiffness_step = 0.5;
+    loop.position_step = 0.25;
+    const Command line{1.0, 0.1, 2.1};  // the center of a spring of 2.0 is -0.4
+    const Command held = as_taken(line, device);
+    EXPECT_NEAR(held.force + held.stiffness * (0.1 - held.position), 1.0, 0.05);
+    loop.largest_center = 1.0;
+    const Command spring = as_taken(line, device);
+    EXPECT_EQ(spring.force, 0.0);
+    EXPECT_EQ(spring.position, -0.5);
+    EXPECT_EQ(spring.stiffness, 2.0);
+    EXPECT_EQ(as_taken({1.04, 0.1, 0.2}, device).force, 1.0) << "without stiffness it is a force";
 }
 
 /// A grid of lines with the force of a curve and chosen slopes.
@@ -175,6 +197,24 @@ TEST(TangentCounterexample, AFallingForceNeedsDampingWithADelay) {
     grid.damping = 0.0;
     grid.delay = 0;
     EXPECT_LE(most_taken(grid), 1e-6) << "without delay it needs none";
+}
+
+TEST(TangentCounterexample, TheRoundedCenterOfASpringNeedsFriction) {
+    // The center of the force alternates about half a step, so it is rounded up at one reading and down at the next one
+    static constexpr double step = 0.02;
+    DeviceProfile device;
+    device.held_line.emplace().largest_center = 1e6;
+    device.held_line->position_step = step;
+    const auto force = [](double x) { return x - 0.5 * step; };
+    LineGrid grid = grid_of(-1.0, 0.1, 21, force, [](double) { return 1.0; });
+    for (std::size_t k = 0; k < grid.line.size(); ++k) {
+        grid.line[k].force += k % 2 == 0 ? 1e-6 : -1e-6;
+        grid.line[k] = as_taken(grid.line[k], device);
+    }
+    grid.reach = 1;
+    EXPECT_GT(most_taken(grid), 1e-3);
+    grid.friction = 0.5 * step;
+    EXPECT_LE(most_taken(grid), 1e-9) << "the slope times half a step of the center";
 }
 
 /// Returns the energy that a hand takes out of a hysteresis by motions to and fro without damping; `slope` replaces the

@@ -4,10 +4,12 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "palpate/fields/readable.hpp"
+#include "palpate/fields/value.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/render.hpp"
@@ -34,9 +36,10 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& op
     auto live = std::make_unique<LiveDeviceOf<Inverse3Device>>(
         Inverse3Device{std::move(settings)}, [](const Inverse3Device& device) -> DeviceReport {
             const Inverse3Info& info = device.info();
+            const auto value = [](std::optional<double> number) { return number ? Value{*number} : Value{}; };
             return {"inverse3",
-                    {{"force_gate", info.force_gate},
-                     {"damping", info.damping},
+                    {{"force_gate", value(info.force_gate)},
+                     {"damping", value(info.damping)},
                      {"skipped_states", device.skipped_states()}},
                     {{"service",
                       "force gate " + readable(info.force_gate) + ", damping " + readable(info.damping)},
@@ -48,11 +51,13 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& op
     }
     const Inverse3Info& info = live->device().info();
     const std::string filters = live->report().lines.front().second;
-    // A certificate holds for the force that is sent; the service changes it by these settings
+    // A certificate holds for the force that is sent; the service changes it by these filters
     const bool certified = !options.uncertified && model.certificate;
     if (certified && (info.force_gate != 0.0 || info.damping != 0.0)) {
-        refuse("device " + options.device + ": the Inverse Service changes forces (" + filters +
-               "): set both to 0 in its settings, or set uncertified");
+        refuse(
+            "device " + options.device + ": the Inverse Service reports " + filters +
+            " after this program set both to 0, but a certificate holds without its filters: install version "
+            "3.5 or newer of the service and close programs that set its filters, or set uncertified");
     }
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
