@@ -390,10 +390,11 @@ void bind_model(py::module_& module) {
         "f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j, |e_j| <= Y_j. The ratio p is a\n"
         "network of one input with the wavelets alpha, beta, weight, the slope `linear` and the constant\n"
         "`bias`.");
-    memory.def(py::init(&make_memory), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
-               "stiffness"_a, "time_constant_s"_a, "yield_stretch"_a = py::none(),
-               "Makes the memory; without `yield_stretch` no branch slips. The model that gets it checks the\n"
-               "values.");
+    memory.def(
+        py::init(&make_memory), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
+        "stiffness"_a, "time_constant_s"_a, "yield_stretch"_a = py::none(),
+        "Makes the memory; without `yield_stretch` no branch slips. The model that gets it checks the\n"
+        "values.");
     memory.def_property_readonly("alpha", [](const MemoryParameters& m) { return row(m.ratio.alpha); });
     memory.def_property_readonly("beta", [](const MemoryParameters& m) { return row(m.ratio.beta); });
     memory.def_property_readonly("weight", [](const MemoryParameters& m) { return row(m.ratio.weight); });

@@ -122,8 +122,7 @@ TEST(Memory, LoopsOfSlidersGrowWithTheirLength) {
     memory.stiffness.push_back(2.0);
     memory.time_constant_s.push_back(std::numeric_limits<double>::infinity());
     memory.yield_stretch = {0.1, 0.25};
-    const ForceModel model =
-        ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain()}.with_memory(memory);
+    const ForceModel model = ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain()}.with_memory(memory);
     const auto object = force_of(model, 1e-3);
     const auto loading = [](double moved) {
         return moved + 4.0 * std::min(moved, 0.1) + 2.0 * std::min(moved, 0.25);
@@ -137,7 +136,8 @@ TEST(Memory, LoopsOfSlidersGrowWithTheirLength) {
     const double turn = loading(0.9);
     EXPECT_NEAR(object.move_for(0.9, 1e9, state).sample.force, turn, 1e-14) << "a slider does not relax";
     for (const double x : {0.85, 0.6, 0.1}) {
-        EXPECT_NEAR(object.move_for(x, 0.1, state).sample.force, turn - 2.0 * loading((0.9 - x) / 2.0), 1e-14);
+        EXPECT_NEAR(object.move_for(x, 0.1, state).sample.force, turn - 2.0 * loading((0.9 - x) / 2.0),
+                    1e-14);
     }
     EXPECT_DOUBLE_EQ(model.memory()->largest_tension(), 0.4 + 0.5);
     EXPECT_DOUBLE_EQ(model.memory()->largest_energy(), 0.5 * 4.0 * 0.01 + 0.5 * 2.0 * 0.0625);

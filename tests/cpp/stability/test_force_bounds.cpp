@@ -396,7 +396,7 @@ TEST(ForceBounds, OfAMemoryAreSumsOverItsBranches) {
     MemoryParameters memory;
     memory.stiffness = {4.0, 10.0};
     memory.time_constant_s = {0.5, 0.02};
-    memory.yield_stretch = {0.25, 50.0};           // the second branch never slips
+    memory.yield_stretch = {0.25, 50.0};          // the second branch never slips
     memory.ratio = {1, {}, {}, {}, {-2.0}, 3.0};  // 3 - 2 x: 3 to 1, with an integral of 2
     const NetworkParameters spring{1, {}, {}, {}, {0.5}, 0.0};
     const ForceModel plain{spring, test::unit_domain()};

@@ -25,7 +25,7 @@ struct MemoryParameters {
     NetworkParameters ratio{.linear = {0.0}, .bias = 1.0};  ///< p, change of the coordinate by position [-]
     std::vector<double> stiffness;                          ///< stiffness k_j of each branch, >= 0 [N/m]
     std::vector<double> time_constant_s;                    ///< time constant tau_j of each branch, > 0 [s]
-    std::vector<double> yield_stretch{};                    ///< stretch Y_j at which each branch slips, > 0 [m]; or none
+    std::vector<double> yield_stretch{};  ///< stretch Y_j at which each branch slips, > 0 [m]; or none
 
     /// Returns the yield stretch Y_j of a branch [m]; infinite if no branch slips.
     [[nodiscard]] double yield_at(std::size_t j) const noexcept {
@@ -258,8 +258,8 @@ class MemoryForce {
         const double rest = std::clamp(g.value, -force_limit_, force_limit_);
         const double least = contact_ ? std::min(rest, 0.0) : -force_limit_;
         const double unlimited = rest + p.value * sum.force;
-        Recorded result{{unlimited, g.slope + p.slope * sum.force + p.value * p.value * sum.stiffness, g.integral,
-                         force_.extrapolated(x)},
+        Recorded result{{unlimited, g.slope + p.slope * sum.force + p.value * p.value * sum.stiffness,
+                         g.integral, force_.extrapolated(x)},
                         1.0};
         const double limit = std::clamp(unlimited, least, force_limit_);
         if (limit != unlimited) {

@@ -188,8 +188,8 @@ class ExportedForce {
         const double unlimited = rest + ratio * sum;
         const double force = std::clamp(unlimited, least, limit);
         if (force == unlimited) {
-            const double slope = static_cast<double>(g.slope) + static_cast<double>(p.slope) * sum +
-                                 ratio * ratio * stiffness;
+            const double slope =
+                static_cast<double>(g.slope) + static_cast<double>(p.slope) * sum + ratio * ratio * stiffness;
             return {static_cast<Real>(force), static_cast<Real>(slope)};
         }
         const double factor = std::clamp((force - rest) / (unlimited - rest), 0.0, 1.0);

@@ -53,11 +53,11 @@ struct ExportedLag {
 /// Numbers of the branches of a model with memory, in the units in which the largest force of the branches along their
 /// coordinate is 1. The second curve of the table is the ratio, which is then a force too.
 struct ExportedMemory {
-    std::vector<double> stiffness;  ///< k_j of each branch
-    std::vector<double> kept;       ///< share of a stretch that is left after a period at rest [-]
+    std::vector<double> stiffness;        ///< k_j of each branch
+    std::vector<double> kept;             ///< share of a stretch that is left after a period at rest [-]
     std::vector<double> largest_stretch;  ///< bound of |e_j|
-    double sudden = 0.0;            ///< sum of the stiffnesses for a motion within one period
-    bool contact = false;           ///< true if the branches do not pull the tool
+    double sudden = 0.0;                  ///< sum of the stiffnesses for a motion within one period
+    bool contact = false;                 ///< true if the branches do not pull the tool
 };
 
 /// A model as tables and numbers for a program in C without a library: the force law, and the structure of a plan.

@@ -22,9 +22,10 @@ namespace palpate {
 /// Bounds of a memory over all positions: branches of stiffness k_j and time constant tau_j, ratio p with |p| <= P and
 /// |p'| <= P', stretches |e_j| <= U_j. U_j is the range of the coordinate, or the yield stretch if it is smaller.
 struct MemoryBounds {
-    double stiffness = 0.0;      ///< P^2 sum_j k_j, the largest stiffness of the branches [N/m]
-    double bending = 0.0;        ///< P' sum_j k_j U_j, the largest slope by a change of the ratio [N/m]
-    double bending_per_m = 0.0;  ///< P P' sum_j k_j, largest increase of `bending` for each metre of U_j [N/m^2]
+    double stiffness = 0.0;  ///< P^2 sum_j k_j, the largest stiffness of the branches [N/m]
+    double bending = 0.0;    ///< P' sum_j k_j U_j, the largest slope by a change of the ratio [N/m]
+    double bending_per_m =
+        0.0;  ///< P P' sum_j k_j, largest increase of `bending` for each metre of U_j [N/m^2]
     double relaxation_per_s =
         0.0;  ///< P^2 sum_j k_j / tau_j, largest decrease of the stiffness by time [N/(m*s)]
 };

@@ -122,8 +122,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
 /// Reads the key `memory` of a model file: the ratio, a network of one input, and the branches. A branch without a time
 /// constant (null) does not relax, and one without a yield stretch does not slip.
 inline MemoryParameters read_memory(const JsonField& memory) {
-    memory.require_keys({"alpha", "beta", "weight", "linear", "bias", "stiffness", "time_constant_s",
-                         "yield_stretch"});
+    memory.require_keys(
+        {"alpha", "beta", "weight", "linear", "bias", "stiffness", "time_constant_s", "yield_stretch"});
     MemoryParameters read;
     for (const JsonField& item : memory["alpha"].items()) {
         read.ratio.alpha.push_back(item.positive());
