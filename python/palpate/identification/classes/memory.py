@@ -328,6 +328,8 @@ def better_with_memory(
     refined = shape.without_idle(fit.solved(shape)[1])
     if refined is None:
         return _refused(found, "no branch lowers the criterion")
+    if len(refined.log_yield) == 1:
+        return _refused(found, "one branch that slips is a play operator, as hysteresis has")
     if recorded.ranges.log_tau is not None and not len(refined.log_yield):
         shortest, longest = np.exp(recorded.ranges.log_tau)
         if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:

@@ -314,8 +314,11 @@ def test_loops_that_grow_with_the_distance_become_branches_that_slip(timed: bool
     assert any("slip from stretches" in line for line in model.notes["identification"])
 
 
-def test_one_loop_stays_hysteresis() -> None:
-    position = growing(1.0)
-    model = palpate.identify(position, with_noise(position + 0.2 * np.sign(np.gradient(position)), 0.005))
+@pytest.mark.parametrize("seed", [1, 2])
+def test_one_branch_that_slips_is_the_play_operator_of_hysteresis(seed: int) -> None:
+    time, position = ramps_and_holds(seed)
+    position = gaussian_filter1d(position, 5)
+    force = 2.0 * position + 0.3 * np.sin(5.0 * position) + 15.0 * (position - play(position, 0.01))
+    model = palpate.identify(position, with_noise(force, 0.003, seed), time=time)
     assert model.memory is None
-    assert model.hysteretic
+    assert model.play_radius == pytest.approx(0.01, rel=0.05)
