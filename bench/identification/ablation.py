@@ -38,6 +38,7 @@ from bench.studies import count, markdown_table, measured_data, write_results
 import palpate
 from palpate import InputError, Model, Recording
 from palpate.baselines import comparable
+from palpate.identification.data.strokes import weights_behind_turns
 from palpate.recording import checks
 from palpate.recording.checks import Check
 from palpate.recording.motion import strokes_from_order, velocity
@@ -161,6 +162,14 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
+def _whole(path: Any, *_: Any) -> Any:
+    return np.ones(len(path))
+
+
+def _not_near(path: Any, order: Any, residual: Any, touched: Any, least: float, *_: Any) -> Any:
+    return weights_behind_turns(path, order, residual, touched, least, 0)
+
+
 def _no_waits(position: Any) -> Any:
     return None if strokes_from_order(position) is None else _none(position)
 
@@ -230,6 +239,12 @@ RULES = (
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
+    Rule("rows behind turns share an error", f"{CLASSES}.hysteresis", "weights_behind_turns", _whole),
+    Rule(
+        "rows next to turns of a tool that leaves", f"{CLASSES}.hysteresis", "weights_behind_turns", _not_near
+    ),
+    Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
+    Rule("largest yield stretch", f"{CLASSES}.memory", "LARGEST_YIELD", 1.0),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),

@@ -106,14 +106,6 @@ class MemoryNetwork {
     [[nodiscard]] const NetworkCurve& ratio() const noexcept { return ratio_; }
     /// Returns true if the tool can leave the object. The memory then never pulls the tool.
     [[nodiscard]] bool contact() const noexcept { return contact_; }
-    /// Returns the sum of the stiffnesses of the branches [N/m].
-    [[nodiscard]] double stiffness() const noexcept {
-        double sum = 0.0;
-        for (const double k : parameters_.stiffness) {
-            sum += k;
-        }
-        return sum;
-    }
     /// Return bounds of |p| and |dp/dx| over all positions.
     [[nodiscard]] double largest_ratio() const noexcept { return largest_ratio_; }
     [[nodiscard]] double steepest_ratio() const noexcept { return steepest_ratio_; }

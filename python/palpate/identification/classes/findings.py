@@ -339,7 +339,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=best.error_on(None).rmse,
-        share=None if best.strokes is None else best.strokes.share,
+        share=best.share,
         settled_rmse=replace(error, weight=error.weight * best.share).rmse,
         left_out_nrmse=left_out_nrmse(selection),
         residuals=int(np.count_nonzero(counted)),

@@ -135,11 +135,10 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
     force = data.force if best.moving is None else data.force - best.moving.force
-    weight = best.strokes.share if best.strokes is not None else np.ones(len(used))
     compressor = Compressor(
         data.box,
         force,
-        weight=weight if data.weight is None else weight * data.weight,
+        weight=best.share if data.weight is None else best.share * data.weight,
         max_positions=best.rows.cells,
         limits=data.limits,
     )

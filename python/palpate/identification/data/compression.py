@@ -131,8 +131,8 @@ class Compressor:
         """
         key = self._key
         if share is not None:
-            used = share[self.kept] > 0
-            return self._part(share[self.kept]).rows(None if side is None else side[self.kept][used])
+            here = share[self.kept]
+            return self._part(here).rows(None if side is None else side[self.kept][here > 0])
         if side is not None:
             side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)

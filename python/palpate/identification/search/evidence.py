@@ -229,9 +229,9 @@ class Candidate:
         return None if self.strokes is None else self.strokes.side
 
     @property
-    def share(self) -> Float1D | float:
+    def share(self) -> Float1D:
         """(n,) weight of every row in the fit, from 0 to 1, besides the samples that it represents."""
-        return 1.0 if self.strokes is None else self.strokes.share
+        return np.ones(len(self.data.force)) if self.strokes is None else self.strokes.share
 
     @property
     def play_radius(self) -> float | None:
