@@ -170,7 +170,7 @@ def _not_near(path: Any, order: Any, residual: Any, touched: Any, least: float, 
     return weights_behind_turns(path, order, residual, touched, least, 0)
 
 
-def _no_waits(position: Any) -> Any:
+def _no_waits(position: Any, time: Any = None) -> Any:
     return None if strokes_from_order(position) is None else _none(position)
 
 

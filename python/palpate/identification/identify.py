@@ -19,7 +19,7 @@ from ..model import Model
 from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
-from ..recording.roles import informative, role_counts
+from ..recording.roles import informative, role_counts, without_wrong_readings
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
@@ -146,7 +146,16 @@ def identify(
             require_in_range(name, column)
     fitted, sections = in_sections(recordings)
     with one_thread():
-        network, settings, rows = _fitted_with_period(fitted, settings, object_of)
+        network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
+        if network.residual is not None and len(network.residual) == sum(map(len, fitted)):
+            residuals = np.split(network.residual, np.cumsum([len(each) for each in fitted])[:-1])
+            fitted, more, count = without_wrong_readings(fitted, residuals)
+            if count:
+                network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
+                recordings = recordings if sections else fitted
+                notes += more
+                dropped["wrong reading"] = dropped.get("wrong reading", 0) + count
+        settings = chosen
         network = replace(network, notes=(*notes, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)

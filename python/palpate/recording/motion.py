@@ -268,9 +268,9 @@ def noise_band(x: Float1D) -> float:
     return max(TURN_NOISE * max(noise_of(section) for section in sections), TURN_STEPS * step)
 
 
-def waits(position: Float1D) -> NDArray[np.bool_] | None:
+def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] | None:
     """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order. Returns None
-    if the rows are not in the order of a motion.
+    if the rows are not in the order of a motion. Without `time` (n,), rows have equal distances in time.
 
     The distance that the tool has travelled is that of a play operator as wide as the noise, which noise does
     not move. The speed around a row is the smaller one of the median speeds of `STEPS_AROUND` distances
@@ -281,34 +281,40 @@ def waits(position: Float1D) -> NDArray[np.bool_] | None:
     x = (position - position.min()) / float(np.ptp(position))
     band = noise_band(x)
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
+    tick = np.arange(len(x), dtype=np.float64)
+    if time is not None:
+        tick = (time - time[0]) / float(np.median(np.diff(time)))
     step = max(STEP, 2.0 * band)
     if travelled[-1] <= 2 * STEPS_AROUND * step:
         return np.zeros(len(x), dtype=bool)
-    # First and last row of each step of distance: interpolated, because a row can travel several steps.
+    # Start and end of each step of distance: interpolated, because a row can travel several steps.
     moved, at_row = np.unique(travelled, return_index=True)
-    reached = np.interp(np.arange(0.0, travelled[-1], step), moved, at_row)
-    rows = np.diff(reached, append=len(x) - 1.0)
-    around = np.pad(rows, STEPS_AROUND, constant_values=np.nan)
+    reached = np.interp(np.arange(0.0, travelled[-1], step), moved, tick[at_row])
+    ticks = np.diff(reached, append=tick[-1])
+    around = np.pad(ticks, STEPS_AROUND, constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(around, STEPS_AROUND)
     typical = np.full(len(windows), np.nan)  # unknown at the start and at the end of the motion
     known = np.count_nonzero(np.isfinite(windows), axis=1)
-    enough = known >= max(1, min(STEPS_AROUND // 2, len(rows) - 1))
+    enough = known >= max(1, min(STEPS_AROUND // 2, len(ticks) - 1))
     typical[enough] = np.nanmedian(windows[enough], axis=1)
-    nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])
+    nearby = np.fmax(typical[: len(ticks)], typical[-len(ticks) :])
     nearby = np.maximum(np.nan_to_num(nearby, nan=1.0), np.finfo(float).tiny)
-    speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(rows) - 1)]
-    row = np.arange(len(x))
-    first = np.maximum(row - np.maximum(np.ceil(2.0 * band / speed), 1.0).astype(np.int64), 0)
-    slow = travelled - travelled[first] < SLOW_RATIO * speed * (row - first)
+    speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(ticks) - 1)]
+    # Speed is taken back to the last row that is far enough, at least to the row before.
+    first = np.searchsorted(tick, tick - np.ceil(2.0 * band / speed), side="right") - 1
+    first = np.maximum(np.minimum(first, np.arange(len(x)) - 1), 0)
+    slow = travelled - travelled[first] < SLOW_RATIO * speed * (tick - tick[first])
     slow[0] = slow[1]
     found = np.zeros(len(x), dtype=bool)
     for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
         # The tool stops between two rows: the last row that moves less than half of a step waits as well.
-        stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
+        moved_there = travelled[begin - 1] - travelled[begin - 2]
+        stopped = begin > 1 and moved_there < 0.5 * speed[begin - 1] * (tick[begin - 1] - tick[begin - 2])
         # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
         first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
-        found[first_row:end] = end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= SHORT_WAY
+        lasting = tick[end - 1] - tick[max(first_row - 1, 0)]
+        found[first_row:end] = end - first_row > 1 and lasting * speed[begin:end].max() >= SHORT_WAY
     return found
 
 

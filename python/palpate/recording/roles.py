@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .._typing import Int8Vector
+from .._typing import Float1D, Int8Vector
 from .checks.wrong_readings import repeated_rows, wrong_readings
 from .contact import contact_at
 from .motion import waits
@@ -55,7 +55,7 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     rows.
     """
     role = np.full(len(recording), Role.MOVING, dtype=np.int8)
-    of_motion = None if recording.input_names else waits(recording.motion.position)
+    of_motion = None if recording.input_names else waits(recording.motion.position, recording.motion.time)
     if of_motion is None or (waiting := of_motion[recording.motion.rows]).all():
         return role
     position = recording.position
@@ -102,21 +102,43 @@ def informative(recordings: Sequence[Recording]) -> tuple[list[Recording], list[
     for number, recording in enumerate(recordings):
         again = repeated_rows(recording)
         drop(number, again, "repeated", "repeat the previous row and were dropped")
-        distinct = kept[number]
-        wrong = wrong_readings(distinct.motion.position, distinct.position, distinct.force, distinct.inputs.T)
-        rows = np.flatnonzero(~again)[wrong]
-        position, force = recording.file_unit("position"), recording.file_unit("force")
-        named = ", ".join(
-            f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
-            for row in rows[:MOST_NAMED_ROWS]
-        )
-        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
-        drop(number, wrong, "wrong reading", f"are wrong readings and were dropped: {named}{more}")
+    kept, of_wrong, count = without_wrong_readings(kept)
+    notes += of_wrong
+    dropped["wrong reading"] = count
     deepest = max(float(each.position.max()) for each in kept)
     for number, recording in enumerate(kept):
         approach = roles_of(recording, deepest) == Role.APPROACH
         drop(number, approach, "approach", "are far from the contact and were dropped")
     return kept, notes, {name: count for name, count in dropped.items() if count}
+
+
+def without_wrong_readings(
+    recordings: Sequence[Recording], residuals: Sequence[Float1D] | None = None
+) -> tuple[list[Recording], list[str], int]:
+    """Returns recordings without rows with a wrong reading, notes that name them, and their number. With the
+    residuals of a model, these are compared in place of the forces."""
+    kept: list[Recording] = []
+    notes, count = list[str](), 0
+    for number, recording in enumerate(recordings):
+        residual = None if residuals is None else residuals[number]
+        path, position, force = recording.motion, recording.position, recording.force
+        wrong = wrong_readings(path.position, position, force, recording.inputs.T, residual)
+        kept.append(recording.without(wrong) if wrong.any() else recording)
+        if not wrong.any():
+            continue
+        rows = np.flatnonzero(wrong)
+        force_unit, position_unit = recording.file_unit("force"), recording.file_unit("position")
+        named = ", ".join(
+            f"row {path.rows[row]}: {force_unit.text(force[row])} at {position_unit.text(position[row])}"
+            for row in rows[:MOST_NAMED_ROWS]
+        )
+        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
+        where = f"recording {number + 1}: " if len(recordings) > 1 else ""
+        notes.append(
+            f"{where}{len(rows)} of {len(path.rows)} rows are wrong readings and were dropped: {named}{more}."
+        )
+        count += len(rows)
+    return kept, notes, count
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:

@@ -228,4 +228,4 @@ def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
         ["recording 1", "1 of 640 rows are wrong readings and were dropped"],
         ["recording 2", "1 of 160 rows are wrong readings and were dropped"],
     ]
-    assert ["row 80:" in notes[0], "row 20:" in notes[1]] == [True, True]
+    assert ["row 100:" in notes[0], "row 104:" in notes[1]] == [True, True]

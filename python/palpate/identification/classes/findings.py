@@ -21,6 +21,7 @@ from ..data.rows import Rows, period_notes
 from ..decision import latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
+from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection
@@ -53,8 +54,7 @@ def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    of_motion = network.damping is not None or network.memory is not None
-    findings = [*findings_of(recordings, side, of_motion=of_motion), *network.findings]
+    findings = [*findings_of(recordings, side), *network.findings]
     largest = max(network.nrmse, network.left_out_nrmse)
     rows = (
         "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
@@ -149,13 +149,14 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     rows = np.flatnonzero(best.error.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
-    data, residual = best.data, best.residual[rows]
+    data, residual, weight = best.data, best.residual[rows], best.error.weight[rows]
     group = _places(data.box[rows], None if best.side is None else best.side[rows])
-    count = np.maximum(np.bincount(group, minlength=2 * PLACES), 1)
+    count = np.bincount(group, weight, 2 * PLACES)
     mean, force, square = (
-        np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
+        np.bincount(group, weight * values, 2 * PLACES) / np.where(count > 0.0, count, 1.0)
+        for values in (residual, data.force[rows], residual**2)
     )
-    error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1, 1))
+    error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1.0, 1.0))
     jnd = force_jnd(force, _floor(best) or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
     worst = int(np.argmax(noticed))
@@ -220,22 +221,23 @@ def drift_findings(best: Candidate) -> list[Finding]:
     if len(data.names) > 1 or data.repeats is not None or direction is None:
         return []
     rows = np.flatnonzero((best.error.weight > 0.0) & (direction != 0))
-    stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
-    middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
-    group = _places(data.box[rows], direction[rows])
+    weight, group = best.error.weight[rows], _places(data.box[rows], direction[rows])
+    total = np.maximum(np.bincount(group, weight), TINY)
 
     def within(values: Float1D) -> Float1D:
         """Returns the values minus their mean in each place and direction."""
-        mean = np.bincount(group, values) / np.maximum(np.bincount(group), 1)
-        return np.asarray(values - mean[group])
+        return np.asarray(values - (np.bincount(group, weight * values) / total)[group])
 
+    stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
+    middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
     moment, residual = within(middle), within(best.residual[rows])
-    if not (squares := float(moment @ moment)) > np.finfo(float).eps * len(rows):
+    squares = float(weight @ moment**2)
+    if not squares > np.finfo(float).eps * len(rows):
         return []
-    change = float(moment @ residual) / squares
+    change = float((weight * moment) @ residual) / squares
     noise = residual - change * moment
     independent = max(1.0, len(rows) * (1.0 - max(neighbour_correlation(noise), 0.0)))
-    error = float(np.sqrt(noise @ noise / squares / independent))
+    error = float(np.sqrt(weight @ noise**2 / squares / independent))
     excess, least = abs(change) - PLACE_ERRORS * error, _floor(best)
     if excess <= least:
         return []
@@ -244,7 +246,8 @@ def drift_findings(best: Candidate) -> list[Finding]:
             "from the first row to the last the force at the same position and stroke "
             f"{'rises' if change > 0.0 else 'falls'} by {data.force_unit.text(abs(change))}, "
             f"{excess / least:.2g} just noticeable differences: the zero of the force or the object changed. "
-            "Let both warm up, and do not set the force to zero during the recording"
+            "Let both warm up, do not set the force to zero during the recording, or identify the parts of "
+            "the recording separately with --rows"
         )
     ]
 
@@ -338,9 +341,9 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         lower=lower,
         rmse=error.rmse,
         nrmse=error.nrmse,
-        rmse_of_all=best.error_on(None).rmse,
+        rmse_of_all=float(np.sqrt(np.mean(best.residual**2))),
+        residual=best.residual,
         share=best.share,
-        settled_rmse=replace(error, weight=error.weight * best.share).rmse,
         left_out_nrmse=left_out_nrmse(selection),
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),

@@ -361,11 +361,10 @@ def better_with_memory(
     if recorded.contact and options.below == "auto" and others[0] < error:
         findings.append(_pulls(recordings[0], recorded, others[0], error))
         network, (error, of_motion) = linear, others
-    before_motion = found.rmse if weights is None else found.settled_rmse
-    if of_motion**2 > (1.0 + LEAST_GAIN) * before_motion**2:
+    if of_motion**2 > (1.0 + LEAST_GAIN) * found.rmse**2:
         # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that is
         # wrong while the tool moves.
-        change = recordings[0].file_unit("force").interval(before_motion, of_motion)
+        change = recordings[0].file_unit("force").interval(found.rmse, of_motion)
         return _refused(found, f"it raises the RMS error while the tool moves from {change}")
     nrmse = error / recorded.spread
     held_out = fit.held_out_errors(refined)

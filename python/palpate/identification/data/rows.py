@@ -17,7 +17,7 @@ from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
-from ...recording.motion import Piece, pieces, velocity
+from ...recording.motion import Piece, ordered_strokes, pieces, velocity
 from ...recording.roles import Role, roles_of, unused_rows
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
@@ -359,11 +359,14 @@ def _first_equal(recordings: Sequence[Recording]) -> list[int]:
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
-    """Returns the indices, among kept rows, at which a recording or a continuous motion between gaps of time
-    starts."""
+    """Returns the indices, among kept rows, at which a recording starts, or a motion behind a gap of time in
+    which the tool may have turned: it does not move on in the direction of the rows before and after."""
     starts, before = [], 0
     for recording, rows in zip(recordings, kept, strict=True):
         first = [0] if recording.time is None else [piece.rows.start for piece in pieces(recording)]
+        if (way := ordered_strokes(recording)) is not None:
+            step = np.sign(np.diff(recording.position, prepend=recording.position[0]))
+            first = [row for row in first if not (row and way[row - 1] == way[row] == step[row])]
         starts += [before + int(np.count_nonzero(rows[:row])) for row in first]
         before += int(np.count_nonzero(rows))
     return tuple(dict.fromkeys(start for start in starts if start < before))

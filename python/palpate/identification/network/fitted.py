@@ -103,15 +103,15 @@ class FittedNetwork:
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
     rmse: float = 0.0
-    """RMS error on the samples of the identification [force]"""
+    """RMS error on the samples of the identification, with their weights in the fit [force]"""
     nrmse: float = 0.0
     """RMS error divided by the standard deviation of the force [-]"""
     rmse_of_all: float = 0.0
     """RMS error on every row of the recordings, also on those that are not fitted [force]"""
+    residual: Float1D | None = None
+    """(n,) force of each row minus that of the network [force]"""
     share: Float1D | None = None
     """(n,) weight of each row in the fit, from 0 to 1; None: 1 each"""
-    settled_rmse: float = 0.0
-    """RMS error with the weights `share` [force]"""
     left_out_nrmse: float = 0.0
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
     residuals: int = 0
@@ -189,7 +189,7 @@ class FittedNetwork:
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
-            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse")
+            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "residual")
         }
         return replace(
             self,

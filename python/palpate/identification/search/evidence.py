@@ -178,7 +178,8 @@ class RowError:
     force: Float1D
     """(n,)"""
     weight: Float1D
-    """(n,) number of samples of each row; 0 for a row that is left out of the error"""
+    """(n,) number of samples of each row, times its weight in the fit; 0 for a row that is left out of the
+    error"""
     within: float = 0.0
     """Sum of squared differences of the samples from the mean force of their row [force^2]; 0 if each row is
     one sample"""
@@ -318,13 +319,12 @@ class Candidate:
         return replace(error, weight=np.where(self.data.reported, error.weight, 0.0))
 
     def error_on(self, samples: Float1D | None) -> RowError:
-        """Returns the error if each row represents the given number of samples (n,), or 1 sample each. Rows
-        without velocity, acceleration or direction state are left out if the model needs them."""
-        weight = np.ones(len(self.residual)) if samples is None else samples
+        """Returns the error if each row represents the given number of samples (n,), or 1 sample each, with
+        the weights of the fit. Rows without velocity, acceleration or direction state are left out if the
+        model needs them."""
+        weight = self.share if samples is None else samples * self.share
         if self.moving is not None:
             weight = weight * self.moving.known
-        if self.strokes is not None:
-            weight = weight * self.strokes.known
         return RowError(self.residual, self.data.force, weight, self.data.within)
 
 

@@ -16,7 +16,6 @@ from ...verdict import Finding, usable
 from ..conversion import MIN_ROWS
 from .cells import Checked
 from .gaps import position_gaps
-from .parts import changed_force
 from .ranges import implausible_range
 from .recordings import scale_findings
 from .sensors import clipped_force, repeated_samples
@@ -103,34 +102,25 @@ CHECKS = (
         "lost rows, a stroke that ends early, one wrong position in a table without order",
         {"gap_share": 0.02, "gap_ratio": 8.0, "end_share": 0.05, "named": 2},
     ),
-    Check(
-        "changed force",
-        changed_force,
-        "another object, zero, speed or depth from a row on, an object that settles",
-        {"blocks": 32, "explained_share": 0.4, "distance_share": 0.1, "place_cells": 0.1},
-    ),
 )
 """All checks, in the order of their findings. Each threshold is described in its function."""
 
 
-def quality_findings(recording: Recording, *, of_motion: bool = False) -> list[Finding]:
-    """Returns findings on a recording as it was read; empty without defects. If the model of the force has
-    damping or a memory (`of_motion`), the force may change at the same position."""
+def quality_findings(recording: Recording) -> list[Finding]:
+    """Returns findings on a recording as it was read; empty without defects."""
     if len(recording) < MIN_ROWS:
         return []
-    checked = Checked(recording, of_motion)
+    checked = Checked(recording)
     return [finding for check in CHECKS for finding in check.findings(checked, **check.thresholds)]
 
 
-def findings_of(
-    recordings: Sequence[Recording], side: Float1D | None = None, *, of_motion: bool = False
-) -> list[Finding]:
+def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
     """Returns findings on each recording, with its name if there are several, and on all of them together.
 
     `side` (n,) is the direction of the rows of all recordings if they do not state it.
     """
     if len(recordings) == 1:
-        return quality_findings(recordings[0], of_motion=of_motion)
+        return quality_findings(recordings[0])
     names = [
         each.source.files[0] if each.source.files else f"recording {number}"
         for number, each in enumerate(recordings, 1)
@@ -138,6 +128,6 @@ def findings_of(
     found = [
         Finding(finding.level, f"{name}: {finding.sentence}")
         for name, recording in zip(names, recordings, strict=True)
-        for finding in quality_findings(recording, of_motion=of_motion)
+        for finding in quality_findings(recording)
     ]
     return found + scale_findings(recordings, side)

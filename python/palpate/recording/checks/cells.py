@@ -41,8 +41,6 @@ class Checked:
     """Recording to check, with the facts that several checks need."""
 
     recording: Recording
-    of_motion: bool = False
-    """True if the model has damping or a memory: the force may change at the same position"""
 
     @cached_property
     def lower(self) -> float:
@@ -64,7 +62,7 @@ class Checked:
         few rows belong to a stroke."""
         if self.recording.input_names:
             return None
-        waiting = waits(self.recording.position)
+        waiting = waits(self.recording.position, self.recording.time)
         if waiting is None:
             return cell_rows(self.recording)
         moving = np.flatnonzero(~waiting)
@@ -80,10 +78,6 @@ class CellRows:
     """(k,) indices, in the recording, of the rows that are compared, ascending"""
     cell: NDArray[np.intp]
     """(k,) index of the position cell of each row; rows of a release have the index plus `cells`"""
-    place: Float1D
-    """(k,) position of each row inside its cell: 0 at the lower edge, 1 at the upper edge"""
-    residual: Float1D
-    """(k,) force of each row minus the mean force of its stroke at the same position"""
     cells: int
     """Number of position cells"""
     press: Float1D
@@ -107,26 +101,21 @@ def cell_rows(recording: Recording) -> CellRows | None:
         return None
     cells = min(len(row) // (2 * LEAST_ROWS_PER_CELL), MOST_CELLS)
     x, f, release = recording.position[row], recording.force[row], side[row] < 0
-    place = cells * ((x - lower) / travel)
-    at = np.minimum(place.astype(np.intp), cells - 1)
+    at = np.minimum((cells * ((x - lower) / travel)).astype(np.intp), cells - 1)
     cell = at + cells * release
     count = np.bincount(cell, minlength=2 * cells)
     used = np.maximum(count, 1)
     mean_x, mean_f = np.bincount(cell, x, 2 * cells) / used, np.bincount(cell, f, 2 * cells) / used
-    residual = np.zeros_like(f)
     curves: list[tuple[Float1D, Float1D]] = []
-    for rows, of in ((~release, slice(0, cells)), (release, slice(cells, None))):
+    for of in (slice(0, cells), slice(cells, None)):
         compared = count[of] >= LEAST_COMPARED_ROWS
-        curve = mean_x[of][compared], mean_f[of][compared]
-        if compared.any():
-            residual[rows] = f[rows] - np.interp(x[rows], *curve)
-        curves.append(curve)
+        curves.append((mean_x[of][compared], mean_f[of][compared]))
     (press_x, press_f), (release_x, release_f) = curves
     press, released = np.empty(0), np.empty(0)
     if len(press_x) and len(release_x):
         shared = (release_x >= press_x[0]) & (release_x <= press_x[-1])
         press, released = np.interp(release_x, press_x, press_f)[shared], release_f[shared]
-    return CellRows(row, cell, place - at, residual, cells, press, released)
+    return CellRows(row, cell, cells, press, released)
 
 
 def sides(recording: Recording) -> NDArray[np.int8]:

@@ -50,7 +50,11 @@ def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
 def wrong_readings(
-    motion: Float1D, position: Float1D, force: Float1D, inputs: Sequence[Float1D] | NDArray[np.float64] = ()
+    motion: Float1D,
+    position: Float1D,
+    force: Float1D,
+    inputs: Sequence[Float1D] | NDArray[np.float64] = (),
+    residual: Float1D | None = None,
 ) -> NDArray[np.bool_]:
     """Returns True (n,) for rows with a wrong reading of position (n,), force (n,) or a further input (n,).
 
@@ -59,26 +63,33 @@ def wrong_readings(
     row nearby. Several wrong readings side by side are outside the range of all others. At the largest and
     smallest positions a wall may be touched by a single row. Rows that are not in the order of a motion have
     no neighbours, and no wrong readings. `motion` (m,) is the position of all rows in recorded order, of
-    which these rows can be a part.
+    which these rows can be a part. A residual (n,), the force minus that of a model, is compared in place of
+    the force: it does not change along a steep part.
     """
     found = np.zeros(len(force), dtype=bool)
     if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
         return found
-    for values, at_ends in ((position, True), *((each, True) for each in inputs), (force, False)):
-        found |= _deviating(values, position, ~found, at_ends)
+    seen = force if residual is None else residual
+    for values, shown, at_ends in (
+        (position, position, True),
+        *((each, each, True) for each in inputs),
+        (seen, force, False),
+    ):
+        reach = np.subtract(*np.quantile(shown[~found], (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE)))
+        found |= _deviating(values, position, ~found, at_ends, float(reach))
     return found if found.mean() <= MOST_WRONG_SHARE else np.zeros(len(force), dtype=bool)
 
 
 def _deviating(
-    values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool
+    values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool, reach: float
 ) -> NDArray[np.bool_]:
-    """Returns True (n,) for the given rows whose value deviates from those before and after them.
+    """Returns True (n,) for the given rows whose value deviates from those before and after them. `reach` is
+    the range of the measured quantity.
 
     First the values are found that are further from all others than these are from each other: several of
     them hide each other from their neighbours. All others are compared with few neighbours.
     """
     found = np.zeros(len(values), dtype=bool)
-    reach = float(np.subtract(*np.quantile(values[given], (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE))))
 
     def inner(rows: NDArray[np.intp], others: NDArray[np.intp]) -> NDArray[np.bool_]:
         x, of_others = position[rows], position[others]
