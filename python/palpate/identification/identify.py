@@ -148,7 +148,9 @@ def identify(
     with one_thread():
         network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
         if network.residual is not None and len(network.residual) == sum(map(len, fitted)):
-            residuals = np.split(network.residual, np.cumsum([len(each) for each in fitted])[:-1])
+            # Rows behind a turn with a small weight share an error: none of them is wrong alone.
+            counted = network.residual * (1.0 if network.share is None else network.share)
+            residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
             fitted, more, count = without_wrong_readings(fitted, residuals)
             if count:
                 network, chosen, rows = _fitted_with_period(fitted, settings, object_of)

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from palpate._core.model import play
 from palpate.recording.motion import noise_band, noise_of, resolution_of, strokes_from_order, turns_of, waits
 
 IN_AND_OUT = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
@@ -201,3 +202,31 @@ def test_the_steps_of_a_quantised_motion_are_not_noise(rows: int) -> None:
 def test_a_quantised_motion_waits_only_in_its_first_step(steps: int, repeat: int) -> None:
     position = np.round(np.repeat(IN_AND_OUT, repeat) * steps) / steps
     assert all(position[row] == position[0] for row in rests(position))
+
+
+def by_change(step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns positions and times of two cycles with friction, stored for each change of force by `step`."""
+    time = np.linspace(0.0, 8.0, 80_001)
+    x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
+    force = 10.0 * x + (x - play(x, 0.005)) / 0.005
+    rows = np.flatnonzero(np.diff(np.floor(force / step), prepend=np.nan))
+    return x[rows], time[rows]
+
+
+def test_rows_that_are_stored_by_change_do_not_wait_behind_a_turn() -> None:
+    position, time = by_change(0.1)
+    found, without_time = waits(position, time), waits(position)
+    assert found is not None
+    assert without_time is not None
+    assert not found.any()
+    assert without_time.any(), "rows at one distance in time would wait: there they move less"
+
+
+def test_a_wait_of_few_rows_is_found_by_its_time() -> None:
+    position, time = by_change(0.1)
+    at = len(time) // 8
+    position = np.insert(position, at, [position[at - 1]] * 3)
+    time = np.r_[time[:at], time[at - 1] + np.array([1.0, 2.0, 3.0]), time[at:] + 3.0]
+    found = waits(position, time)
+    assert found is not None
+    assert set(range(at, at + 3)) <= set(np.flatnonzero(found).tolist()) <= set(range(at - 1, at + 4))

@@ -201,7 +201,7 @@ def test_neighbouring_readings_far_beyond_all_others_are_wrong() -> None:
 def test_more_than_a_tenth_of_the_rows_are_not_wrong_readings() -> None:
     at = np.arange(5, 795, 9)[:80]
     assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(at.tolist(), 900.0))) == at.tolist()
-    y = changed(FORCE, dict.fromkeys([*at.tolist(), 797], 900.0))
+    y = changed(FORCE, dict.fromkeys([*at.tolist(), 790], 900.0))
     assert wrong_rows(PRESS, y) == []
     assert palpate.identify(recorded(PRESS, y)).verdict.level == "no"
 
@@ -229,3 +229,17 @@ def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
         ["recording 2", "1 of 160 rows are wrong readings and were dropped"],
     ]
     assert ["row 100:" in notes[0], "row 104:" in notes[1]] == [True, True]
+
+
+def test_a_wrong_reading_on_a_steep_part_is_found_with_the_model() -> None:
+    """The force changes more from row to row than the reading is wrong."""
+    x = press_and_release(200)
+    y = 40.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))
+    y[150] += 3.0
+    assert wrong_rows(x, y) == []
+    model = palpate.identify(x, y)
+    assert any(
+        "1 of 400 rows are wrong readings and were dropped: row 150" in n
+        for n in model.notes["identification"]
+    )
+    assert model.fit.nrmse < 1e-3

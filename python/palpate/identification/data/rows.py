@@ -366,7 +366,9 @@ def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) 
         first = [0] if recording.time is None else [piece.rows.start for piece in pieces(recording)]
         if (way := ordered_strokes(recording)) is not None:
             step = np.sign(np.diff(recording.position, prepend=recording.position[0]))
-            first = [row for row in first if not (row and way[row - 1] == way[row] == step[row])]
+            earlier, later = np.roll(way, 1), np.append(way[1:], 0)
+            moves_on = (earlier == way) & (step == way) & (later == way)
+            first = [row for row in first if row == 0 or not moves_on[row]]
         starts += [before + int(np.count_nonzero(rows[:row])) for row in first]
         before += int(np.count_nonzero(rows))
     return tuple(dict.fromkeys(start for start in starts if start < before))

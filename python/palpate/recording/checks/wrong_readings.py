@@ -111,6 +111,8 @@ def _deviating(
         nearby = np.maximum(nearby[: len(rows)], nearby[-len(rows) :])
         usual = np.maximum(nearby, float(np.median(np.abs(np.diff(values[rows])))))
         wrong = _apart(values[rows], NEIGHBOUR_ROWS) > np.maximum(WRONG_RATIO * usual, LEAST_WRONG * reach)
+        if not at_ends:  # few rows on one side can be those of a steep part
+            wrong[:NEIGHBOUR_ROWS] = wrong[-NEIGHBOUR_ROWS:] = False
         if wrong.any():
             wrong &= inner(rows, rows[~wrong])
         if not wrong.any():

@@ -148,3 +148,20 @@ def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
     with_waits = states(waited, np.insert(force, at, force[399]), np.insert(role, at, Role.HOLD))
     assert len(alone) >= 1
     np.testing.assert_array_equal(with_waits, alone)
+
+
+def test_the_reported_error_counts_rows_behind_a_turn_as_the_fit_does() -> None:
+    """The friction reverses over 4 % of the travel as no play operator does; the rest is known to the noise."""
+    time, noise = np.arange(0.0, 8.0, 0.002), 0.001
+    x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
+    way = np.where(np.gradient(x) > 0.0, 1.0, -1.0)
+    since = np.where(way > 0.0, x, 1.0 - x)
+    side = way * np.where(time < 1.0, 1.0, 1.0 - 2.0 * np.exp(-((since / 0.03) ** 5)))
+    force = 0.2 * x + 0.1 * side + np.random.default_rng(0).normal(0.0, noise, len(x))
+    model = identify(Recording.from_arrays(x, force, time))
+    assert model.hysteretic
+    spread = float(np.std(force))
+    assert model.fit.nrmse * spread == pytest.approx(noise, rel=0.5)
+    assert model.notes["left_out_nrmse"] * spread == pytest.approx(noise, rel=0.5)
+    assert verify(model, Recording.from_arrays(x, force, time)).rmse > 3.0 * noise
+    assert model.verdict.level == "good"

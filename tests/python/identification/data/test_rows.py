@@ -13,7 +13,7 @@ from palpate import InputError, Model, Recording, identify, load_model, read_rec
 from palpate._core.dynamics import environment_filters
 from palpate.cli.main import main
 from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
-from palpate.identification.data.rows import Rows, modulo, paper_target
+from palpate.identification.data.rows import Rows, modulo, paper_target, rows_of
 from palpate.recording import sample_force, sample_recording
 
 
@@ -345,3 +345,14 @@ def test_fewer_rows_keep_their_share_of_the_scatter_within_a_row() -> None:
     assert rows.only(kept).within == pytest.approx(2.0)
     weighted = Rows(("position",), np.arange(6.0)[:, None], np.zeros(6), weight=np.arange(6.0), within=3.0)
     assert weighted.only(kept).within == pytest.approx(3.0 * 6.0 / 15.0)
+
+
+@pytest.mark.parametrize(("first", "starts"), [(25, (0,)), (75, (0, 75))], ids=["moves on", "turns"])
+def test_a_play_follows_a_motion_over_a_gap_in_which_the_tool_moves_on(
+    first: int, starts: tuple[int]
+) -> None:
+    time = 0.01 * np.arange(400)
+    position = 0.5 - 0.5 * np.cos(np.pi * time)
+    kept = np.delete(np.arange(400), slice(first, first + 50))
+    recording = Recording.from_arrays(position[kept], position[kept], time=time[kept])
+    assert rows_of([recording], IdentifyOptions()).starts == starts
