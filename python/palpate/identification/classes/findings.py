@@ -327,6 +327,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or drift_findings(best)
         or place_findings(best, options.hysteresis_nonnegative)
     )
+    share = np.where(data.fitted, best.share, 1.0)
     band, checked = band_with_check(best)
     below, lower = options.below, network.lower
     if below == "auto":
@@ -341,9 +342,9 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         lower=lower,
         rmse=error.rmse,
         nrmse=error.nrmse,
-        rmse_of_all=float(np.sqrt(np.mean(best.residual**2))),
+        rmse_of_all=replace(error, weight=share).rmse,
         residual=best.residual,
-        share=best.share,
+        share=share,
         left_out_nrmse=left_out_nrmse(selection),
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),

@@ -103,13 +103,10 @@ class Hysteresis(ModelClass):
         return below
 
     def _fits_better(self, one: Candidate, other: Candidate) -> bool:
-        """True if the criterion of the first of two candidates is smaller on the rows that both can use, also
-        behind turns. A play radius must lower it as much as a model class, compared with the order of
-        rows."""
-        assert one.strokes is not None
-        assert other.strokes is not None
-        both = one.strokes.known & other.strokes.known
-        weight = both.astype(np.float64) if one.data.weight is None else both * one.data.weight
+        """True if the criterion of the first of two candidates is smaller on the rows that both can use, with
+        their weights in the first one. A play radius must lower it as much as a model class, compared with
+        the order of rows."""
+        weight = one.error_on(one.data.weight).weight * (other.share > 0.0)
         name, evidence = self._selection.judge.criterion, self._selection.options.search.evidence
         if name in ON_HELD_OUT_ROWS:
             name = "bic"

@@ -456,7 +456,7 @@ def _errors(
     network: FittedNetwork, recordings: Sequence[Recording], weights: Float1D | None
 ) -> tuple[float, float]:
     """Returns the RMS errors of a model with memory on all rows of recordings, and on the rows at which the
-    tool moves, with weights (n,) of all rows [force]."""
+    tool moves, both with weights (n,) of all rows [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
@@ -466,5 +466,6 @@ def _errors(
         squares.append((model.force_over_time(part.time_or_row, part.position)[0] - part.force) ** 2)
         moving.append(roles_of(part) == Role.MOVING)
     square = np.concatenate(squares)
-    share = np.concatenate(moving) * (1.0 if weights is None else weights)
-    return float(np.sqrt(square.mean())), float(np.sqrt(np.average(square, weights=share)))
+    share = np.ones(len(square)) if weights is None else weights
+    of_all, of_motion = (np.average(square, weights=each) for each in (share, share * np.concatenate(moving)))
+    return float(np.sqrt(of_all)), float(np.sqrt(of_motion))

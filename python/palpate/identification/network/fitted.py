@@ -107,11 +107,12 @@ class FittedNetwork:
     nrmse: float = 0.0
     """RMS error divided by the standard deviation of the force [-]"""
     rmse_of_all: float = 0.0
-    """RMS error on every row of the recordings, also on those that are not fitted [force]"""
+    """RMS error on every row of the recordings, also on those that are not fitted, with the weights `share`
+    [force]"""
     residual: Float1D | None = None
     """(n,) force of each row minus that of the network [force]"""
     share: Float1D | None = None
-    """(n,) weight of each row in the fit, from 0 to 1; None: 1 each"""
+    """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
     left_out_nrmse: float = 0.0
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
     residuals: int = 0
