@@ -293,6 +293,7 @@ def _identified(
         network,
         rmse=rmse,
         nrmse=nrmse,
+        settled_nrmse=(nrmse, network.left_out_nrmse),
         decisions=(*network.decisions, *decisions),
         notes=(*notes, *network.notes),
         findings=(*findings, *network.findings),

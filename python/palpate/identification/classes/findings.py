@@ -25,7 +25,7 @@ from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection
-from .repeatability import band_with_check, left_out_nrmse
+from .repeatability import band_with_check, left_out_residual
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -55,19 +55,17 @@ def verdict_of(
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
     findings = [*findings_of(recordings, side), *network.findings]
-    largest = max(network.nrmse, network.left_out_nrmse)
-    rows = (
-        "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
-    )
+    fitted, left_out = network.settled_nrmse
+    rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""
-    if not network.findings and network.nrmse <= USABLE_NRMSE:
+    if not network.findings and fitted <= USABLE_NRMSE:
         cure = ". The rows are too far apart to show the force between them: record more rows per stroke"
     elif not network.findings:
         timed = all(each.time is not None for each in recordings)
         directed = all(each.direction is not None for each in recordings)
         more = _more_inputs(timed, directed)
         cure = f". The force has noise or depends on more than {_inputs(network)}: {more}"
-    findings += error_findings(largest, rows, cure)
+    findings += error_findings(max(fitted, left_out), rows, cure)
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
@@ -146,10 +144,10 @@ def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
 def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
     hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
-    rows = np.flatnonzero(best.error.weight > 0.0)
+    rows = np.flatnonzero(best.settled.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
-    data, residual, weight = best.data, best.residual[rows], best.error.weight[rows]
+    data, residual, weight = best.data, best.residual[rows], best.settled.weight[rows]
     group = _places(data.box[rows], None if best.side is None else best.side[rows])
     count = np.bincount(group, weight, 2 * PLACES)
     mean, force, square = (
@@ -220,8 +218,8 @@ def drift_findings(best: Candidate) -> list[Finding]:
     data, direction = best.data, strokes_from_order(best.data.path[:, 0])
     if len(data.names) > 1 or data.repeats is not None or direction is None:
         return []
-    rows = np.flatnonzero((best.error.weight > 0.0) & (direction != 0))
-    weight, group = best.error.weight[rows], _places(data.box[rows], direction[rows])
+    rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
+    weight, group = best.settled.weight[rows], _places(data.box[rows], direction[rows])
     total = np.maximum(np.bincount(group, weight), TINY)
 
     def within(values: Float1D) -> Float1D:
@@ -327,7 +325,13 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or drift_findings(best)
         or place_findings(best, options.hysteresis_nonnegative)
     )
-    share = np.where(data.fitted, best.share, 1.0)
+    share, left_out = np.where(data.fitted, best.share, 1.0), left_out_residual(selection)
+    settled = best.settled
+    if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":
+        notes.append(
+            f"Rows behind turns share an error, because friction reverses there, and count less in the fit: "
+            f"NRMSE {error.nrmse:.2g} on all rows, {settled.nrmse:.2g} with these weights."
+        )
     band, checked = band_with_check(best)
     below, lower = options.below, network.lower
     if below == "auto":
@@ -343,9 +347,11 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=replace(error, weight=share).rmse,
+        settled_rmse=settled.rmse,
+        settled_nrmse=(settled.nrmse, replace(settled, residual=left_out).nrmse),
         residual=best.residual,
         share=share,
-        left_out_nrmse=left_out_nrmse(selection),
+        left_out_nrmse=replace(error, residual=left_out).nrmse,
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
         path=tuple(report.path),

@@ -352,7 +352,7 @@ def better_with_memory(
     weights = (
         found.share if found.share is not None and len(found.share) == sum(map(len, recordings)) else None
     )
-    (error, of_motion), findings = (
+    (error, settled, of_motion), findings = (
         _errors(network, recordings, weights),
         list(_undetermined(found, recordings)),
     )
@@ -360,15 +360,16 @@ def better_with_memory(
     others = _errors(linear, recordings, weights)
     if recorded.contact and options.below == "auto" and others[0] < error:
         findings.append(_pulls(recordings[0], recorded, others[0], error))
-        network, (error, of_motion) = linear, others
-    if of_motion**2 > (1.0 + LEAST_GAIN) * found.rmse**2:
+        network, (error, settled, of_motion) = linear, others
+    if of_motion**2 > (1.0 + LEAST_GAIN) * found.settled_rmse**2:
         # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that is
         # wrong while the tool moves.
-        change = recordings[0].file_unit("force").interval(found.rmse, of_motion)
+        change = recordings[0].file_unit("force").interval(found.settled_rmse, of_motion)
         return _refused(found, f"it raises the RMS error while the tool moves from {change}")
-    nrmse = error / recorded.spread
+    nrmse, settled_nrmse = error / recorded.spread, settled / recorded.spread
     held_out = fit.held_out_errors(refined)
-    gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
+    left_out_nrmse = float(np.sqrt(held_out.mean()))
+    gain = 1.0 - max(settled_nrmse, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
     n_parameters = network.n_parameters + refined.n_parameters
     text = _gain_text(gain, scatter)
@@ -389,8 +390,10 @@ def better_with_memory(
         n_parameters=n_parameters,
         rmse=error,
         nrmse=nrmse,
-        rmse_of_all=error,
-        left_out_nrmse=float(np.sqrt(held_out.mean())),
+        rmse_of_all=settled,
+        settled_rmse=settled,
+        settled_nrmse=(settled_nrmse, left_out_nrmse),
+        left_out_nrmse=left_out_nrmse,
         residuals=fit.n_rows,
         findings=tuple(findings),
         path=found.path + network.path,
@@ -454,9 +457,9 @@ the sum of their squared errors, and the largest number of wavelets"""
 
 def _errors(
     network: FittedNetwork, recordings: Sequence[Recording], weights: Float1D | None
-) -> tuple[float, float]:
-    """Returns the RMS errors of a model with memory on all rows of recordings, and on the rows at which the
-    tool moves, both with weights (n,) of all rows [force]."""
+) -> tuple[float, float, float]:
+    """Returns the RMS error of a model with memory on all rows of recordings, the same with weights (n,) of
+    all rows, and that of the rows at which the tool moves with these weights [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
@@ -467,5 +470,8 @@ def _errors(
         moving.append(roles_of(part) == Role.MOVING)
     square = np.concatenate(squares)
     share = np.ones(len(square)) if weights is None else weights
-    of_all, of_motion = (np.average(square, weights=each) for each in (share, share * np.concatenate(moving)))
-    return float(np.sqrt(of_all)), float(np.sqrt(of_motion))
+    of_all, settled, of_motion = (
+        float(np.sqrt(np.average(square, weights=each)))
+        for each in (np.ones(len(square)), share, share * np.concatenate(moving))
+    )
+    return of_all, settled, of_motion

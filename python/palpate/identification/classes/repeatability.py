@@ -126,8 +126,8 @@ FEW_ROWS = 500
 wavelets little, and only its numbers are fitted again."""
 
 
-def left_out_nrmse(selection: ClassSelection) -> float:
-    """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
+def left_out_residual(selection: ClassSelection) -> Float1D:
+    """Returns the residual (n,) of rows that are left out of the fit, a fifth of them at a time.
 
     A network of few rows is grown again on the other rows. The numbers of another model are fitted again to
     them by a few steps. Rows with correlated noise are left out together.
@@ -155,7 +155,7 @@ def left_out_nrmse(selection: ClassSelection) -> float:
             best, compressor, force, used & (fold != number), used & (fold == number), fit
         )
         residual[left] = again[left]
-    return replace(best.error, residual=residual).nrmse
+    return residual
 
 
 def _pure_error(best: Candidate, repeats: Repeats) -> float | None:

@@ -103,12 +103,16 @@ class FittedNetwork:
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
     rmse: float = 0.0
-    """RMS error on the samples of the identification, with their weights in the fit [force]"""
+    """RMS error on the samples of the identification [force]"""
     nrmse: float = 0.0
     """RMS error divided by the standard deviation of the force [-]"""
     rmse_of_all: float = 0.0
     """RMS error on every row of the recordings, also on those that are not fitted, with the weights `share`
     [force]"""
+    settled_rmse: float = 0.0
+    """RMS error on the samples of the identification, with their weights in the fit [force]"""
+    settled_nrmse: tuple[float, float] = (0.0, 0.0)
+    """NRMSE on the rows of the fit, and on rows that are left out of it, with their weights in the fit [-]"""
     residual: Float1D | None = None
     """(n,) force of each row minus that of the network [force]"""
     share: Float1D | None = None
@@ -190,7 +194,7 @@ class FittedNetwork:
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
-            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "residual")
+            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse", "residual")
         }
         return replace(
             self,

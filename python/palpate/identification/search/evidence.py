@@ -178,8 +178,7 @@ class RowError:
     force: Float1D
     """(n,)"""
     weight: Float1D
-    """(n,) number of samples of each row, times its weight in the fit; 0 for a row that is left out of the
-    error"""
+    """(n,) number of samples of each row; 0 for a row that is left out of the error"""
     within: float = 0.0
     """Sum of squared differences of the samples from the mean force of their row [force^2]; 0 if each row is
     one sample"""
@@ -315,6 +314,12 @@ class Candidate:
     @cached_property
     def error(self) -> RowError:
         """Error on the rows that are reported; they have the weights `data.counted`."""
+        counted = 1.0 if self.data.counted is None else self.data.counted
+        return replace(self.settled, weight=np.where(self.settled.weight > 0.0, counted, 0.0))
+
+    @cached_property
+    def settled(self) -> RowError:
+        """Error on the rows that are reported, with their weights in the fit."""
         error = self.error_on(self.data.counted)
         return replace(error, weight=np.where(self.data.reported, error.weight, 0.0))
 

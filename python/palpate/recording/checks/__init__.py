@@ -64,7 +64,7 @@ CHECKS = (
         "reversed sign",
         reversed_sign,
         "a position that grows out of the object, a force of the object's side, a late force",
-        {"same_sign_share": 0.8, "least_loop_share": 0.02},
+        {"same_sign_share": 0.8},
     ),
     Check(
         "stroke with the wrong sign",

@@ -19,15 +19,13 @@ if TYPE_CHECKING:
     from ..recording import Recording
 
 
-def reversed_sign(checked: Checked, *, same_sign_share: float, least_loop_share: float) -> list[Finding]:
+def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
     """Returns findings on a reversed direction, release force above press force, and falling force.
 
     Parameters
     ----------
     same_sign_share : float
         Share of the positions with the sign of the mean of press minus release force, for a hysteresis [-].
-    least_loop_share : float
-        Least mean of press minus release force, over the standard deviation of the force [-].
     """
     recording = checked.recording
     signs = recording.direction
@@ -47,7 +45,7 @@ def reversed_sign(checked: Checked, *, same_sign_share: float, least_loop_share:
     cells, is_loop, x, f = checked.cells, False, recording.position, recording.force
     if cells is not None and len(cells.loop) >= 4:
         mean = float(np.mean(cells.loop))
-        large = abs(mean) > least_loop_share * float(np.std(f))
+        large = abs(mean) > FORCE_FLOOR * float(np.abs(f).max())
         is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
     if is_loop and mean < 0.0:
         lag_s = _lag_of(recording, -mean)
@@ -130,8 +128,8 @@ def moved_zero(checked: Checked, *, shift_share: float, range_share: float, rows
         _lowest_force(recording, cells.row[(cells.cell >= cells.cells) == way], rows) for way in (False, True)
     )
     # The friction of an object that holds the tool is above zero in the press and below it in the release.
-    # A mirrored press begins and ends at opposite forces.
-    if end > -shift or cells.press.min() < -shift or abs(start) > 0.5 * abs(end):
+    held = float(np.median(cells.release)) < 0.0 or start > 0.5 * abs(end)
+    if end > -shift or cells.press.min() < -shift or held:
         return []
     return [
         usable(
