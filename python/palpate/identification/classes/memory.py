@@ -273,8 +273,8 @@ def untested(
         return ""
     if "velocity" in found.inputs:
         return _unsupported(options)
-    if found.nrmse < LEAST_NRMSE:
-        return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
+    if (nrmse := found.settled_nrmse[0]) < LEAST_NRMSE:
+        return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
     every_second = 2 * found.residuals >= fitted_rows
     upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
     if every_second and upper < LEAST_CORRELATION:

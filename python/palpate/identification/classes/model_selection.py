@@ -143,7 +143,7 @@ class Velocity(ModelClass):
         )
         assert motion is not None
         damped = moving is not None and moving.mass is None
-        if not (damped or below.error.nrmse > USABLE_NRMSE):
+        if not (damped or below.settled.nrmse > USABLE_NRMSE):
             return below
         residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
         if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
@@ -164,9 +164,9 @@ class Velocity(ModelClass):
             force_unit=data.force_unit,
         )
         both = select(over_both, self._selection.options)
-        fitted = rows if data.weight is None else rows & (data.weight > 0.0)
-        before = float(np.mean(residual[fitted] ** 2))
-        share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
+        weight = below.share[rows] if data.weight is None else (below.share * data.weight)[rows]
+        before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
+        share = 1.0 - after / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
