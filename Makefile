@@ -8,7 +8,7 @@
 #   make test-full    all tests: long counts, sanitizers, fuzzing, real time, the installed package     (hours)
 #   make coverage     lines and branches that the tests execute                        (an hour)
 #   make mutants      share of small errors in the C++ headers that the tests find      (hours)
-#   make bench        all studies, JSON and figures in build/bench/
+#   make bench        all studies, JSON and figures in build/bench/; make bench-sample: one study of each folder, short
 #   make figures      the same studies, figures and generated pages in docs/
 #   make docs         the documentation site: build/docs/html/index.html; every example and command of it is run
 #   make lint | format | stubs | output | clean
@@ -25,7 +25,7 @@ PYTHON ?= python3
 # PALPATE_TEST_SCALE multiplies the random cases of a test: 1 for every change, 100 for the long run.
 # PALPATE_BENCH_SCALE multiplies the duration of a benchmark: 1 for published numbers, 0.01 to test that all run and
 # give correct results. The environment can set both. The sanitizers make a program ten times slower and get a tenth
-# of the cases.
+# of the cases. tools/bench.sh lists the studies that are run for every change.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
@@ -61,7 +61,7 @@ moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo m
 module_names := find python -name '*.py' | LC_ALL=C sort
 renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
-.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench bench-sample figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved renamed
 
 help:
@@ -155,6 +155,7 @@ test-full: setup control examples $(stamps)/simulators
 	$(call part,$(MAKE) --no-print-directory fuzz)
 	$(call part,$(MAKE) --no-print-directory test-packages)
 	$(call part,$(python) -m pytest tests/usb tests/simulators)
+	$(call part,PALPATE_BENCH_SCALE=0.01 tools/bench.sh)
 	$(system_packages) windows
 	$(call part,tools/windows_tests.sh)
 	$(system_packages) browser
@@ -175,6 +176,9 @@ test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package
 
 bench: setup control
 	tools/bench.sh
+
+bench-sample: setup control
+	tools/bench.sh --sample
 
 figures: setup control
 	tools/bench.sh docs
