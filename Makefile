@@ -187,7 +187,7 @@ figures: setup control
 # error, and so is a broken link between pages.
 docs: $(stamps)/core control $(stamps)/test $(stamps)/docs
 	$(python) -m sphinx --nitpicky --fail-on-warning --keep-going --quiet --jobs auto docs build/docs/html
-	$(python) -m pytest --quiet -m "" tests/docs tests/python/test_readme.py
+	$(python) -m pytest --quiet -m "docs and not full" tests/docs tests/python/test_readme.py
 
 # ------------------------------------------------------------------------------------------------------------ lint
 
