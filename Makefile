@@ -117,8 +117,9 @@ test: | setup
 	$(MAKE) --no-print-directory test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# Files keep their order, because the longest ones contain few tests and would start last.
-parallel_pytest = $(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder
+# Files keep their order, because the longest ones contain few tests and would start last. One process more than
+# processors, because tests wait for programs that they start.
+parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
 test-python: setup control
 	$(parallel_pytest)
 
