@@ -8,7 +8,7 @@
 #   make test-full    all tests: long counts, sanitizers, fuzzing, real time, the installed package     (hours)
 #   make coverage     lines and branches that the tests execute                        (an hour)
 #   make mutants      share of small errors in the C++ headers that the tests find      (hours)
-#   make bench        all studies, JSON and figures in build/bench/
+#   make bench        all studies, JSON and figures in build/bench/; make bench-sample: one study of each folder, short
 #   make figures      the same studies, figures and generated pages in docs/
 #   make docs         the documentation site: build/docs/html/index.html; every example and command of it is run
 #   make lint | format | stubs | output | clean
@@ -25,7 +25,7 @@ PYTHON ?= python3
 # PALPATE_TEST_SCALE multiplies the random cases of a test: 1 for every change, 100 for the long run.
 # PALPATE_BENCH_SCALE multiplies the duration of a benchmark: 1 for published numbers, 0.01 to test that all run and
 # give correct results. The environment can set both. The sanitizers make a program ten times slower and get a tenth
-# of the cases.
+# of the cases. tools/bench.sh lists the studies that are run for every change.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
@@ -61,7 +61,7 @@ moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo m
 module_names := find python -name '*.py' | LC_ALL=C sort
 renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
-.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench bench-sample figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved renamed
 
 help:
@@ -117,8 +117,9 @@ test: | setup
 	$(MAKE) --no-print-directory test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# Files keep their order, because the longest ones contain few tests and would start last.
-parallel_pytest = $(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder
+# Files keep their order, because the longest ones contain few tests and would start last. One process more than
+# processors, because tests wait for programs that they start.
+parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
 test-python: setup control
 	$(parallel_pytest)
 
@@ -155,6 +156,7 @@ test-full: setup control examples $(stamps)/simulators
 	$(call part,$(MAKE) --no-print-directory fuzz)
 	$(call part,$(MAKE) --no-print-directory test-packages)
 	$(call part,$(python) -m pytest tests/usb tests/simulators)
+	$(call part,PALPATE_BENCH_SCALE=0.01 tools/bench.sh)
 	$(system_packages) windows
 	$(call part,tools/windows_tests.sh)
 	$(system_packages) browser
@@ -176,6 +178,9 @@ test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package
 bench: setup control
 	tools/bench.sh
 
+bench-sample: setup control
+	tools/bench.sh --sample
+
 figures: setup control
 	tools/bench.sh docs
 
@@ -183,7 +188,7 @@ figures: setup control
 # error, and so is a broken link between pages.
 docs: $(stamps)/core control $(stamps)/test $(stamps)/docs
 	$(python) -m sphinx --nitpicky --fail-on-warning --keep-going --quiet --jobs auto docs build/docs/html
-	$(python) -m pytest --quiet -m "" tests/docs tests/python/test_readme.py
+	$(python) -m pytest --quiet -m "docs and not full" tests/docs tests/python/test_readme.py
 
 # ------------------------------------------------------------------------------------------------------------ lint
 

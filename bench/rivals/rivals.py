@@ -37,7 +37,7 @@ PAGE = "rivals.md"
 
 DRAWS = 20
 """Number of random scenes of each case in a full run."""
-EVERY = 1 if SCALE >= 0.1 else 25
+EVERY = 1 if SCALE >= 0.1 else 61
 """A short run measures each n-th case only."""
 
 Case = Mapping[str, Any]

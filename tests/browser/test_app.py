@@ -164,6 +164,7 @@ def test_a_dropped_file_becomes_the_files_of_the_shown_commands(
     assert (folder / "knob.html").exists()
 
 
+@pytest.mark.full
 def test_a_dragged_stretch_is_left_out_and_undo_brings_it_back(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
     app.page.run("document.getElementById('chart-course').scrollIntoView({block: 'center'})")
@@ -178,6 +179,7 @@ def test_a_dragged_stretch_is_left_out_and_undo_brings_it_back(app: App, recordi
     assert app.page.run("document.getElementById('undo').disabled") is False
 
 
+@pytest.mark.full
 def test_a_refused_file_is_read_after_a_click_on_its_cure(app: App, tmp_path: Path) -> None:
     position = np.linspace(0.0, 4.0, 200)
     rows = "\n".join(f"{x:.4f},{2.0 * x:.4f}" for x in [*position, *position[::-1]])
@@ -189,6 +191,7 @@ def test_a_refused_file_is_read_after_a_click_on_its_cure(app: App, tmp_path: Pa
     assert "400 rows" in app.text("reading")
 
 
+@pytest.mark.full
 def test_a_reloaded_page_shows_the_same_recording_and_model(app: App, recording: Path) -> None:
     app.page.size(WIDTHS["phone"], HEIGHT, phone=True)
     app.after(app.page.drop, recording)
@@ -198,6 +201,7 @@ def test_a_reloaded_page_shows_the_same_recording_and_model(app: App, recording:
     assert (app.text("model"), app.commands()) == before
 
 
+@pytest.mark.full
 def test_the_keyboard_alone_identifies_and_changes_the_device(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
 
@@ -219,6 +223,7 @@ def test_the_keyboard_alone_identifies_and_changes_the_device(app: App, recordin
 
 
 @pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.full
 def test_the_page_fits_the_window_and_every_control_has_a_name(width: str, app: App, recording: Path) -> None:
     app.page.size(WIDTHS[width], HEIGHT, phone=width == "phone")
     app.after(app.page.drop, recording)
@@ -241,6 +246,7 @@ def test_the_page_fits_the_window_and_every_control_has_a_name(width: str, app: 
     assert small == 0
 
 
+@pytest.mark.full
 def test_a_simulated_rendering_moves_the_cursor(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
     app.click("#identify")
@@ -274,6 +280,7 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
 
 
 @needs_control
+@pytest.mark.full
 def test_the_page_shows_a_run_that_ended_between_two_requests(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
     app.click("#identify")
@@ -285,6 +292,7 @@ def test_the_page_shows_a_run_that_ended_between_two_requests(app: App, recordin
     assert app.page.run("!document.getElementById('start').disabled")
 
 
+@pytest.mark.full
 def test_a_dragged_peak_makes_an_edited_object_that_is_compared_with_the_first(
     app: App, tmp_path: Path
 ) -> None:
@@ -308,6 +316,7 @@ def test_a_dragged_peak_makes_an_edited_object_that_is_compared_with_the_first(
     assert app.download("recording", "switch-edited.csv").startswith(b"# edited: peak force")
 
 
+@pytest.mark.full
 def test_one_marked_repeat_is_the_period(app: App, tmp_path: Path) -> None:
     angle = np.linspace(0.0, 40.0, 400)
     rows = "\n".join(f"{a:.4f},{np.sin(np.radians(36.0 * a)):.5f}" for a in angle)
@@ -323,6 +332,7 @@ def test_one_marked_repeat_is_the_period(app: App, tmp_path: Path) -> None:
     assert "10 deg" in app.text("model")
 
 
+@pytest.mark.full
 def test_columns_and_units_are_choices(app: App, tmp_path: Path) -> None:
     rows = "\n".join(f"{0.01 * k:.3f},{0.02 * k:.3f},{k}" for k in range(100))
     (tmp_path / "two.csv").write_text(f"travel_mm,other_mm,load\n{rows}\n", encoding="utf-8")
@@ -334,6 +344,7 @@ def test_columns_and_units_are_choices(app: App, tmp_path: Path) -> None:
     assert "100 rows" in app.text("reading")
 
 
+@pytest.mark.full
 def test_a_finger_scrolls_the_page_over_the_charts(app: App, recording: Path) -> None:
     app.after(app.page.drop, recording)
     app.page.call("Emulation.setTouchEmulationEnabled", enabled=True)

@@ -59,8 +59,8 @@ def picture(data: bytes) -> np.ndarray:
     return np.asarray(matplotlib.image.imread(io.BytesIO(data), format="png"))[..., :3]
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.full)], ids=["light", "dark"])
+@pytest.mark.parametrize("width", ["desk", pytest.param("phone", marks=pytest.mark.full)])
 def test_the_page_draws_all_charts_without_error_and_request(
     width: str, dark: bool, page: Page, report: Path, tmp_path: Path
 ) -> None:
@@ -84,6 +84,7 @@ def test_the_page_draws_all_charts_without_error_and_request(
 
 
 @pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.full
 def test_every_chart_shows_its_data(width: str, page: Page, report: Path, tmp_path: Path) -> None:
     page.media(dark=False)
     page.size(WIDTHS[width], HEIGHT, phone=width == "phone")
@@ -98,6 +99,7 @@ def test_every_chart_shows_its_data(width: str, page: Page, report: Path, tmp_pa
         assert dark.any(), f"chart {number} has no text"
 
 
+@pytest.mark.full
 def test_texts_are_at_least_12_pixels_high_on_a_phone(page: Page, report: Path) -> None:
     page.size(WIDTHS["phone"], HEIGHT, phone=True)
     page.open(report)
@@ -108,6 +110,7 @@ def test_texts_are_at_least_12_pixels_high_on_a_phone(page: Page, report: Path) 
     assert least >= 12.0
 
 
+@pytest.mark.full
 def test_the_colours_follow_the_scheme_while_the_page_is_open(page: Page, report: Path) -> None:
     page.media(dark=False)
     page.open(report)
@@ -117,6 +120,7 @@ def test_the_colours_follow_the_scheme_while_the_page_is_open(page: Page, report
     page.wait(f"{label} !== '{light}'")
 
 
+@pytest.mark.full
 def test_a_mouse_zooms_by_dragging_and_the_lower_panel_follows(page: Page, report: Path) -> None:
     page.media(dark=False)
     page.size(WIDTHS["desk"], HEIGHT)
@@ -131,6 +135,7 @@ def test_a_mouse_zooms_by_dragging_and_the_lower_panel_follows(page: Page, repor
     assert after[0] == after[1]
 
 
+@pytest.mark.full
 def test_a_finger_scrolls_the_page_over_a_chart(page: Page, report: Path) -> None:
     page.size(WIDTHS["phone"], HEIGHT, phone=True)
     page.call("Emulation.setTouchEmulationEnabled", enabled=True)
@@ -140,6 +145,7 @@ def test_a_finger_scrolls_the_page_over_a_chart(page: Page, report: Path) -> Non
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.full
 def test_the_printed_page_has_dark_text_and_charts_on_white(
     dark: bool, page: Page, report: Path, tmp_path: Path
 ) -> None:

@@ -41,7 +41,7 @@ NOT_RUN = {
 @pytest.mark.parametrize(
     "name", [name for name, found in BLOCKS.items() if any(not block.not_run for block in found)]
 )
-@pytest.mark.full
+@pytest.mark.docs
 def test_code_of_a_page_runs(name: str) -> None:
     if "palpate-control" in PAGES[name] and not PROGRAM.exists():
         pytest.skip("needs palpate-control, run make control")

@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT / "docs" / "builder"))
 import python_pages  # noqa: E402
 
 pytestmark = [
-    pytest.mark.full,
+    pytest.mark.docs,
     pytest.mark.skipif(not (SITE / "searchindex.js").exists(), reason="needs the site, run make docs"),
 ]
 

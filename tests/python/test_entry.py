@@ -19,8 +19,8 @@ import palpate
 from palpate import IdentifyOptions, InputError, Model, Recording, SearchOptions, identify, load_model, verify
 from palpate.cli.identify import identify as identify_verb
 
-X = np.concatenate([np.linspace(0.0, 4.0, 300), np.linspace(4.0, 0.0, 300)])
-DIRECTION = np.repeat([1.0, -1.0], 300)
+X = np.concatenate([np.linspace(0.0, 4.0, 100), np.linspace(4.0, 0.0, 100)])
+DIRECTION = np.repeat([1.0, -1.0], 100)
 
 
 def force(seed: int = 0) -> np.ndarray:
@@ -65,7 +65,7 @@ def test_a_frame_a_file_and_arrays_give_the_same_model(press: Path) -> None:
 
 def test_a_list_may_mix_recordings_files_and_frames(press: Path) -> None:
     model = identify([press, frame(1), Recording.from_frame(frame(2))])
-    assert model.data.rows == 1800
+    assert model.data.rows == 3 * len(X)
     assert model.data.files == (str(press),)
 
 
@@ -247,6 +247,7 @@ def test_help_and_members_work_without_scikit_learn() -> None:
     assert "WaveletNetworkRegressor needs scikit-learn" in output
 
 
+@pytest.mark.full
 def test_pydoc_shows_the_public_names() -> None:
     completed = subprocess.run(
         [sys.executable, "-m", "pydoc", "palpate"], capture_output=True, text=True, check=True

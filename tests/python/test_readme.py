@@ -34,14 +34,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.splitlines()[0])
-@pytest.mark.full
+@pytest.mark.docs
 def test_snippet_runs(snippet: str, folder: Path) -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True, timeout=300)
 
 
 @needs_program
-@pytest.mark.parametrize("left_out", [(), ("-DPALPATE_COMPILED", "libpalpate_compiled.a")])
-@pytest.mark.full
+@pytest.mark.parametrize(
+    "left_out",
+    [(), pytest.param(("-DPALPATE_COMPILED", "libpalpate_compiled.a"), marks=pytest.mark.full)],
+)
+@pytest.mark.docs
 def test_the_cpp_snippet_prints_the_numbers_of_the_python_snippet(
     folder: Path, left_out: tuple[str, ...]
 ) -> None:
@@ -65,7 +68,7 @@ def test_the_cpp_snippet_prints_the_numbers_of_the_python_snippet(
 PALPATE = Path(sysconfig.get_path("scripts")) / "palpate"
 
 
-@pytest.mark.full
+@pytest.mark.docs
 def test_all_commands_except_those_of_the_installation_run_in_their_order(folder: Path) -> None:
     commands = [arguments for arguments in shell_commands() if arguments[0] not in ("make", ".")]
     assert {arguments[0] for arguments in commands} == {"palpate"}
@@ -81,7 +84,7 @@ def test_all_commands_except_those_of_the_installation_run_in_their_order(folder
         assert completed.returncode == 0, f"{shlex.join(arguments)}: {completed.stdout}{completed.stderr}"
 
 
-@pytest.mark.full
+@pytest.mark.docs
 def test_example_output_equals_the_output_of_the_programs() -> None:
     tool = ROOT / "tools" / "example_output.py"
     completed = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)

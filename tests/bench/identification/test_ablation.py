@@ -79,7 +79,8 @@ def test_the_judgement_of_a_model_uses_every_rule() -> None:
     assert inside == [kept]
 
 
-@pytest.mark.parametrize("number", [4, pytest.param(len(RULES), marks=pytest.mark.full)])
+@pytest.mark.parametrize("number", [4, len(RULES)])
+@pytest.mark.full
 def test_the_study_prints_each_rule_and_writes_its_results(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,6 +9,7 @@ from bench.limits import prediction
 from bench.limits.certificate_table import table_of
 
 
+@pytest.mark.full
 def test_measures_draws_and_fills_both_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prediction, "PREDICTIONS", (0, 4))
     monkeypatch.setattr(prediction, "RANDOM_OBJECTS", 1)

@@ -107,6 +107,7 @@ def test_loss_table_names_the_largest_loss_and_counts_the_methods_of_the_project
     assert row.endswith("| 1 of 1 | 0 | wall, knob | package: 1 | rival: 3 |")
 
 
+@pytest.mark.full
 def test_writes_figures_numbers_and_tables_of_a_part_of_the_cases(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text(

@@ -32,7 +32,7 @@ KEPT_OUT = {"--install-udev-rule", "--scheduler", "--browser"}
 ENDLESS = {"--duration-s", "--seconds", "--jobs", "--settle-s", "--idle-s"}
 """Options whose large values are long work, which is not a hang."""
 
-SLOW = ("demo", "report", "render", "app")
+SLOW = ("demo", "report", "render", "app", "check-device")
 """Verbs that take a second or more."""
 
 TEXTS = "m.json|a.csv|missing.csv|folder|broken.json|empty.csv|out.json|rad|N|mm|position_rad|force_N*m|x=N|:"

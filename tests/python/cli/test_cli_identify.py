@@ -73,6 +73,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert result["seconds"] > 0
 
 
+@pytest.mark.full
 def test_only_rows_with_a_velocity_are_held_out_for_a_model_over_velocity(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

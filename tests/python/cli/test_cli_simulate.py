@@ -256,7 +256,7 @@ def test_progress_is_called_during_the_simulation() -> None:
         Scheme(structure="implicit"),
         DeviceProfile(),
         Hand(),
-        3000.0,  # simulated time [s] in which the progress is reported several times
+        1500.0,  # simulated time [s] in which the progress is reported several times
         progress=ticks.append,
     )
     assert ticks[0] == 0

@@ -14,6 +14,10 @@ from palpate.verdict import LEVELS, Verdict, no, usable
 from test_cli_identify import spring
 from test_every_verb import VERBS
 
+every_quick_verb = pytest.mark.parametrize(
+    "verb", sampled(sorted(VERBS), *(verb for verb in VERBS if verb != "demo"))
+)
+
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -23,7 +27,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("verb", sorted(VERBS))
+@every_quick_verb
 def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
     verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -35,7 +39,7 @@ def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
     assert code == (1 if level == "no" else 0)
 
 
-@pytest.mark.parametrize("verb", sampled(sorted(VERBS), *(verb for verb in VERBS if verb != "demo")))
+@every_quick_verb
 def test_the_verdict_is_a_field_of_the_json_object_and_sets_the_exit_code(
     verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

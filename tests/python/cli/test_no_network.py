@@ -100,6 +100,7 @@ def test_palpate_control_opens_a_network_socket_only_for_telemetry(tmp_path: Pat
 
 @needs_program
 @needs_emulation
+@pytest.mark.full
 def test_palpate_control_opens_no_network_socket_with_a_usb_device(tmp_path: Path) -> None:
     command = [PROGRAM, MODEL, "--device", "usb", "--uncertified", "--duration-s", "0.2"]
     completed = run([sys.executable, RUNNER, "--lock-step", "--", *command], tmp_path)

@@ -197,6 +197,7 @@ def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     assert len(read_recording(out)) > 100
 
 
+@pytest.mark.full
 def test_verify_confirms_a_recording_of_the_simulated_object(tmp_path: Path) -> None:
     knob = load_model(OBJECT)
     ticks: list[int] = []
@@ -233,6 +234,7 @@ def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path
 
 
 @needs_emulation
+@pytest.mark.full
 def test_a_handle_without_motion_gives_the_verdict_no(tmp_path: Path) -> None:
     completed = run_record(tmp_path / "a.csv", "--json", device=["--no-hand"])
     assert completed.returncode == 1

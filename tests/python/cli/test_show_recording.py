@@ -107,6 +107,7 @@ def test_the_views_are_drawn(
     assert (missing in " ".join(capsys.readouterr().out.split())) == (name == "strokes")
 
 
+@pytest.mark.full
 def test_the_frame_of_a_model_is_drawn(tmp_path: Path) -> None:
     model, frame = model_by_hand().save(tmp_path / "m.json"), tmp_path / "frame.png"
     assert main(["show", str(model), "--plot-frame", str(frame)]) == 0

@@ -139,7 +139,7 @@ def test_a_spring_is_rendered_and_zero_force_confirmed(
             "is two drives that answer to the same number: give one of them another",
         ),
         ({"number": 2}, 2, "does not answer: check its number, its power, the wires and the bit rate"),
-        ({"answers": 100}, 1, "timeouts"),
+        pytest.param({"answers": 100}, 1, "timeouts", marks=pytest.mark.full),
     ],
 )
 def test_a_fault_of_the_bus_ends_in_zero_torque(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from can_motor import CanMotor
+from conftest import sampled
 from control_program import control, every_row, needs_program
 from emulated_device import emulated
 from mit_drive import Drive
@@ -122,7 +123,7 @@ def test_a_lost_frame_ends_a_certified_run_and_the_line(kind: str, planned: Path
     assert drive.torque == 0.0
 
 
-@pytest.mark.parametrize("lost", [3, 5])
+@pytest.mark.parametrize("lost", sampled([3, 5], 5))
 def test_a_hand_takes_at_most_the_stated_energy_after_lost_commands(
     kind: str, planned: Path, lost: int
 ) -> None:

@@ -238,6 +238,7 @@ def test_a_fault_ends_a_certified_run_in_zero_force(
 
 
 @needs_program
+@pytest.mark.full
 def test_a_wheel_that_ignores_reports_ends_its_force_with_the_duration(planned: Path, node: Path) -> None:
     with emulated(node, Wheel(period_s=PERIOD_S, deaf_after=300)) as wheel:
         control(planned, "--device", name(node), "--wait-ms", 0.5, "--duration-s", 4)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, sampled
 from palpate import DeviceProfile, InputError, load_model, plan
 from palpate.cli.main import main
 from palpate.devices import Check, check, check_device, judge, push_response
@@ -188,7 +188,7 @@ def test_pushes_show_sign_delay_and_mechanics() -> None:
     assert push.mechanics.friction_lower_bound == 0.0
 
 
-@pytest.mark.parametrize("friction", [0.001, 0.003, 0.006, 0.01, 0.012])
+@pytest.mark.parametrize("friction", sampled([0.001, 0.003, 0.006, 0.01, 0.012], 0.001, 0.012))
 def test_pushes_of_two_sizes_separate_friction_from_damping(friction: float) -> None:
     mechanics = push_response(push_ticks(friction=friction), STEP).mechanics
     assert mechanics is not None
@@ -446,6 +446,7 @@ def test_a_fault_that_ends_the_measurement_is_named(
 
 
 @needs_emulation
+@pytest.mark.full
 def test_a_device_that_does_not_answer_during_the_pushes_has_advice_on_the_connection() -> None:
     answer = run_check("--push", "--yes", device=["--no-hand", "--fault", "mute@2300x60"])
     result, findings = findings_of_answer(answer)

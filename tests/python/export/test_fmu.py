@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from conftest import sampled
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import InputError, Model
 from palpate.cli.main import main
@@ -27,7 +28,7 @@ MODELS = {
 }
 
 
-@pytest.fixture(scope="module", params=MODELS)
+@pytest.fixture(scope="module", params=sampled(MODELS, "hysteresis", "far"))
 def model(request: pytest.FixtureRequest) -> Model:
     made: Model = MODELS[request.param]()
     return made

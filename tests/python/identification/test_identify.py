@@ -243,7 +243,7 @@ def test_both_ends_continue_as_they_are_given(end: str, way: float) -> None:
     assert free == pytest.approx(0.0, abs=0.02)
 
 
-@pytest.mark.parametrize("rows", [80, 2000])
+@pytest.mark.parametrize("rows", sampled([80, 2000], 80))
 def test_a_hold_in_which_the_force_relaxes_does_not_change_the_strokes(rows: int) -> None:
     press, relaxing = np.linspace(0.0, 5.0, 1000), np.linspace(0.0, 5.0, rows)
     curve = 60.0 * press + 14.0 * press**2

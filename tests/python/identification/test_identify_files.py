@@ -99,7 +99,7 @@ def test_scatter_within_cells_is_the_noise() -> None:
     assert np.sqrt(summary.within / summary.rows) == pytest.approx(0.02, rel=0.03)
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+@pytest.mark.parametrize("suffix", sampled(["csv", "parquet"], "parquet"))
 @pytest.mark.parametrize("step", sampled([0.0, 1e-3], 1e-3), ids=["any-position", "encoder"])
 def test_the_model_is_that_of_all_rows_at_once(tmp_path: Path, suffix: str, step: float) -> None:
     file, frame = tmp_path / f"press.{suffix}", rows(30_000, step=step)
@@ -433,7 +433,7 @@ def test_every_row_is_used_once(tmp_path: Path, suffix: str, size: str, columns:
     assert palpate.identify_files(file, max_wavelets=1).data.rows == n
 
 
-@pytest.mark.parametrize("size", sampled(SIZES, "half", "one-and-a-row", "two-and-a-half"))
+@pytest.mark.parametrize("size", sampled(SIZES, "one-and-a-row"))
 @pytest.mark.parametrize("part_rows", [150, 1_000_000], ids=["parts", "one-part"])
 def test_every_row_is_used_once_where_text_appears_late(tmp_path: Path, size: str, part_rows: int) -> None:
     n = SIZES[size]
@@ -463,7 +463,7 @@ def test_dropped_rows_are_reported_by_the_command(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("part_rows", sampled([20, 90, 333, 1_000_000], 90, 1_000_000))
-@pytest.mark.parametrize("separator", [",", ";", "\t"], ids=["comma", "semicolon", "tab"])
+@pytest.mark.parametrize("separator", sampled([",", ";", "\t"], "\t"), ids=["comma", "semicolon", "tab"])
 def test_line_breaks_in_quotes_and_blank_lines_lose_no_row(
     tmp_path: Path, part_rows: int, separator: str
 ) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,11 @@ def recorded(seed: int) -> Recording:
     return Recording.from_arrays(angle, torque, direction=way, units=units)
 
 
+@cache
+def compensated_vesc() -> Plan:
+    return compensate(motor(), "vesc")
+
+
 def test_scale_is_that_of_the_closed_form() -> None:
     # b >= T s M / 2 without delay (docs/certificate.md)
     planned = compensate(motor(), weak())
@@ -105,7 +111,7 @@ def test_the_force_is_the_negative_cogging_without_friction_and_mean() -> None:
 
 
 def test_a_controller_cancels_more_than_the_host() -> None:
-    host = compensate(motor(), "vesc")
+    host = compensated_vesc()
     controller = compensate(motor(), "vesc", on_device=15e3)
     assert host.scale is not None
     assert controller.scale is not None
@@ -114,6 +120,7 @@ def test_a_controller_cancels_more_than_the_host() -> None:
     assert "controller" in controller.summary()["runs on"]
 
 
+@pytest.mark.full
 def test_a_controller_that_holds_lines_cancels_more() -> None:
     moteus = DeviceProfile.load(example_profiles()["moteus-r4"][0])
     lines = compensate(motor(), moteus)
@@ -166,7 +173,7 @@ def test_the_plan_states_scale_ripple_and_friction(
     words = ["plan", str(source), "--device", "vesc", "--compensate", "--fresh", str(fresh)]
     assert main([*words, "-o", str(output)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    scale = compensate(motor(), "vesc").scale
+    scale = compensated_vesc().scale
     assert f"compensation scale {scale:.4g}, proved" in shown
     assert re.search(r"ripple of fresh.csv 0.0142 N\*m RMS, 0.008[34]\d* N\*m with the compensation", shown)
     assert "noise included" in shown

@@ -3,6 +3,7 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,19 @@ def wall(stiffness: float) -> Model:
     )
 
 
+@cache
+def held_plan() -> Plan:
+    """Returns a plan that the energy account holds, which the tests only read."""
+    return plan(wall(3000.0), coil(viscous_damping=0.5))
+
+
+@cache
+def proved_plan() -> Plan:
+    return plan(wall(3000.0), COIL)
+
+
 def test_a_proved_plan_with_an_accepted_error_stays_proved() -> None:
-    chosen = plan(wall(3000.0), COIL)
+    chosen = proved_plan()
     assert chosen.certificate is not None
     assert chosen.certificate.verdict == "certified"
     assert chosen.account is None
@@ -43,7 +55,7 @@ def test_a_proved_plan_with_an_accepted_error_stays_proved() -> None:
 def test_the_account_holds_a_model_whose_proved_force_error_is_not_accepted() -> None:
     weak = coil(viscous_damping=0.5)
     proved = plan(wall(3000.0), weak, energy_account=False)
-    held = plan(wall(3000.0), weak)
+    held = held_plan()
     assert proved.certificate is not None
     assert held.certificate is not None
     assert held.account is not None
@@ -98,15 +110,14 @@ def test_a_program_on_a_motor_controller_has_no_account() -> None:
 
 
 def test_presses_at_every_speed_and_rests_with_tremor_are_simulated() -> None:
-    held = plan(wall(3000.0), coil(viscous_damping=0.5))
+    held = held_plan()
     assert held.account is not None
     assert len(held.account.shares) == 6, "four presses and two rests"
     assert held.account.force_error <= 0.01 * np.ptp(held.forces_at_rest()[1])
 
 
 def test_a_held_plan_is_simulated_with_its_account() -> None:
-    device = coil(viscous_damping=0.5)
-    held = plan(wall(3000.0), device)
+    held = held_plan()
     assert held.certificate is not None
     plain = Plan(held.model, held.scheme, None, (), held.limited)
     sent = {}
@@ -117,7 +128,7 @@ def test_a_held_plan_is_simulated_with_its_account() -> None:
 
 
 def test_a_held_plan_is_stored_and_checked_when_it_is_read(tmp_path: Path) -> None:
-    held = plan(wall(3000.0), coil(viscous_damping=0.5))
+    held = held_plan()
     file = held.stored().save(tmp_path / "held.json")
     read = Plan.of(load_model(file))
     assert read.held_by_account
@@ -174,10 +185,7 @@ def test_a_refused_plan_names_the_smallest_force_with_which_a_finger_oscillates(
 
 
 def test_words_of_a_plan() -> None:
-    for device, changes, word in (
-        (COIL, {}, "proved"),
-        (coil(viscous_damping=0.5), {}, "held by the energy account"),
-    ):
-        assert plan(wall(3000.0), device, **changes).summary()["certificate"].startswith(word)
+    assert proved_plan().summary()["certificate"].startswith("proved")
+    assert held_plan().summary()["certificate"].startswith("held by the energy account")
     stable = plan(model_by_hand(), DeviceProfile(coulomb_friction=0.005), mass=1e-3)
     assert stable.summary()["certificate"].startswith("stable near rest, nothing proved")

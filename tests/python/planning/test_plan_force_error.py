@@ -131,6 +131,7 @@ def test_a_changed_network_of_the_plan_is_refused_when_the_file_is_read(tmp_path
     ("device", "damping_b"),
     sampled([("touch", 2.0), ("touch-x", 2.0), ("phantom-premium-1.0", 0.5)], ("touch", 2.0)),
 )
+@pytest.mark.full
 def test_the_named_device_property_is_enough_and_1_percent_less_is_not(
     switch: Model, device: str, damping_b: float
 ) -> None:

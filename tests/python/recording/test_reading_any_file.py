@@ -187,7 +187,7 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-@cases(50 if SCALE == 1 else 150)
+@cases(20 if SCALE == 1 else 150)
 @given(table=tables(), options=st.one_of(st.just({}), st.just({"invalid": "drop"}), OPTIONS))
 def test_any_table_is_read_or_refused(
     table: tuple[bytes, int | None], options: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
@@ -240,7 +240,7 @@ def test_the_unchanged_file_is_read(suffix: str, valid: dict[str, bytes], tmp_pa
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-@cases(20)
+@cases(8 if SCALE == 1 else 20)
 @given(data=st.data())
 def test_a_damaged_file_is_read_or_refused(
     suffix: str, valid: dict[str, bytes], data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
@@ -286,7 +286,7 @@ ARRAYS = st.sampled_from(
 )
 
 
-@cases(50)
+@cases(20 if SCALE == 1 else 50)
 @given(
     arrays=st.dictionaries(st.sampled_from(NAMES), ARRAYS, min_size=1, max_size=4),
     suffix=st.sampled_from(FORMATS[1:5]),

@@ -171,6 +171,7 @@ def test_several_recordings_are_fitted_without_the_waits_of_each() -> None:
     assert model.n_wavelets <= 8
 
 
+@pytest.mark.full
 def test_a_pause_of_a_knob_leaves_no_spike() -> None:
     rng = np.random.default_rng(1)
     turn = np.linspace(0.0, 1080.0, 7200)

@@ -213,6 +213,7 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
     return Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=time)
 
 
+@pytest.mark.full
 def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
     """At one speed the velocity is proportional to its sign, and Coulomb friction explains a loop of constant
     height equally well."""
@@ -228,6 +229,7 @@ def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
         assert two.damping == pytest.approx(0.06, rel=0.05)
 
 
+@pytest.mark.full
 def test_a_negative_damping_is_refused() -> None:
     model = identify(moved(2, damping=-0.03))
     assert model.damping is None

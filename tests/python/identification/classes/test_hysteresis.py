@@ -43,6 +43,7 @@ def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
             assert edge != pytest.approx(far, abs=1e-9)
 
 
+@pytest.mark.full
 def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise() -> None:
     x = wandering(10_000, 1)
     side = state(x, 0.01, -0.6)

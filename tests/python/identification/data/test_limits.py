@@ -149,6 +149,7 @@ def test_repeated_rows_change_neither_model_nor_verdict(times: int) -> None:
     assert f"{800 * (times - 1)} of {800 * times} rows repeat" in model.notes["identification"][0]
 
 
+@pytest.mark.full
 def test_correlation_is_named_in_the_notes() -> None:
     model = identified("noise of correlation 0.9", wall)
     assert any("The noise is correlated" in note for note in model.notes["identification"])

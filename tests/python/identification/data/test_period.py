@@ -158,6 +158,7 @@ def test_an_open_revolution_a_length_or_a_spring_has_no_period_of_a_turn(
 
 
 @pytest.mark.parametrize("seed", sampled([30, 33, 40], 40))
+@pytest.mark.full
 def test_a_period_is_found_below_noise_of_which_each_model_counts_other_independent_rows(
     seed: int,
 ) -> None:

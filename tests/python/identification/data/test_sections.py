@@ -110,6 +110,7 @@ def test_held_out_rows_stay_in_the_motion_of_a_section() -> None:
     assert len(found.motion.position) == pytest.approx(1.25 * len(found), rel=0.01)
 
 
+@pytest.mark.full
 def test_a_long_recording_has_the_model_of_its_force_law() -> None:
     rows = MOST_ROWS + 100_000
     position = 0.5 - 0.5 * np.cos(np.arange(rows) / 300.0)
