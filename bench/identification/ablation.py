@@ -237,6 +237,7 @@ RULES = (
     Rule("pruning", f"{SEARCH}.growth", "MOST_PRUNE_TRIALS", 0),
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
+    Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{CLASSES}.hysteresis", "weights_behind_turns", _whole),
     Rule(

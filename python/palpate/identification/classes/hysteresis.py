@@ -21,7 +21,7 @@ from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate, Samples
-from .class_selection import ClassSelection, ModelClass
+from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
@@ -154,7 +154,13 @@ class Hysteresis(ModelClass):
         if named:
             self._report_sign(kept, kept, free)
             return kept
-        best = judge.better(below, kept)
+        single = self._single_valued(kept) if kept is not free and below.n_wavelets else below
+        best = judge.better(single, kept)
+        if best is single and best.n_wavelets < below.n_wavelets:
+            self._selection.report.notes.append(
+                f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed "
+                "wavelets modelled the difference between press and release."
+            )
         self._report_sign(best, kept, free)
         return best
 
@@ -204,6 +210,26 @@ class Hysteresis(ModelClass):
             weight = weights_behind_turns(data.path[:, 0], order, residual, touched, least, near)
             strokes = replace(strokes, weight=weight)
         return strokes
+
+    def _single_valued(self, hysteresis: Candidate) -> Candidate:
+        """Returns a single-valued force with the wavelets of a network with hysteresis; superfluous wavelets
+        are removed.
+
+        This force is the simpler candidate if the constraints change the network with hysteresis. A network
+        grown without hysteresis is not used: press and release, sampled at different positions by a periodic
+        motion, would look like one rapidly changing force.
+        """
+        selection = self._selection
+        problem = selection.samples.problem(selection.rows)
+        start = problem.solve(hysteresis.solution.basis)
+        problem = problem.with_prior(start.rss)
+        problem, solution = selection.growth.prune(problem, problem.solve(start.basis))
+        line = selection.recorded(selection.constrained(straight_line(selection)))
+        if len(solution.basis) == 0:
+            return line
+        found = selection.candidate("position", problem, solution, hysteresis.stop_reason)
+        found = selection.recorded(selection.constrained(found))
+        return found if selection.judge.accepts(line, found) else line
 
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
         """Reports a cure if the constraint h >= 0 raises the error much: the opposite sign of a column, or no
