@@ -14,7 +14,7 @@ from ..recording import Recording
 from ..recording.checks import quality_findings
 from ..recording.motion import GAP_RATIO, cycles_of, directions_of
 from ..recording.parts import Part, SeveralPartsError
-from ..recording.roles import counts_text, informative, role_counts, roles_of
+from ..recording.roles import Informative, counts_text, role_counts, roles_of
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, picture_frame, picture_recording
@@ -52,7 +52,8 @@ def show_recording(
         if not as_json:
             _print_parts(error.parts)
         raise
-    (kept,), _, dropped = informative([recording])
+    informative = Informative([recording])
+    (kept,), dropped = informative.recordings, informative.dropped
     verdict = Verdict(tuple(quality_findings(kept)))
     strokes, roles = _strokes(recording), role_counts(roles_of(kept)) | dropped
     with drawing() as write_figures:

@@ -19,7 +19,7 @@ from ..model import Model
 from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
-from ..recording.roles import informative, role_counts, without_wrong_readings
+from ..recording.roles import Informative, role_counts
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
@@ -138,7 +138,8 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    recordings, notes, dropped = informative(recordings)
+    informative = Informative(recordings)
+    recordings = informative.recordings
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
@@ -147,18 +148,15 @@ def identify(
     fitted, sections = in_sections(recordings)
     with one_thread():
         network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
-        if network.residual is not None and len(network.residual) == sum(map(len, fitted)):
+        if not sections and network.residual is not None and len(network.residual) == sum(map(len, fitted)):
             # Rows behind a turn with a small weight share an error: none of them is wrong alone.
             counted = network.residual * (1.0 if network.share is None else network.share)
             residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
-            fitted, more, count = without_wrong_readings(fitted, residuals)
-            if count:
+            if informative.drop_wrong_readings(residuals):
+                fitted = recordings = informative.recordings
                 network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
-                recordings = recordings if sections else fitted
-                notes += more
-                dropped["wrong reading"] = dropped.get("wrong reading", 0) + count
         settings = chosen
-        network = replace(network, notes=(*notes, *sections, *network.notes))
+        network = replace(network, notes=(*informative.notes, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
@@ -167,8 +165,8 @@ def identify(
     verdict = verdict_of(network, recordings, known if every_row else None)
     model = model_of(network, recordings[0].units, source, settings, verdict)
     if left_out := sum(map(len, recordings)) - len(rows.force):
-        dropped["left out"] = left_out
-    model.notes["roles"] = role_counts(rows.roles) | dropped
+        informative.dropped["left out"] = left_out
+    model.notes["roles"] = role_counts(rows.roles) | informative.dropped
     if (steepest := SteepestSlope.of(model)) is not None:
         on_it = rows.fitted & steepest.rows(rows.domain[:, 0], known)
         model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))

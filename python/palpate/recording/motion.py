@@ -313,7 +313,7 @@ def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] |
         # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
         first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
-        lasting = tick[end - 1] - tick[max(first_row - 1, 0)]
+        lasting = tick[end - 1] - tick[first_row] + 1.0
         found[first_row:end] = end - first_row > 1 and lasting * speed[begin:end].max() >= SHORT_WAY
     return found
 

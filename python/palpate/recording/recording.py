@@ -24,7 +24,7 @@ from .files import write_csv
 from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
 from .motion import cycles_of
-from .roles import informative
+from .roles import Informative
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
 
@@ -235,7 +235,7 @@ class Recording:
     @property
     def verdict(self) -> Verdict:
         """Verdict on the quality of the recording: clipped or slow sensors, gaps, wrong signs or units."""
-        (kept,), *_ = informative([self])
+        (kept,) = Informative([self]).recordings
         return Verdict(tuple(quality_findings(kept)))
 
     @property

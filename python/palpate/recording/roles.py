@@ -86,59 +86,62 @@ def counts_text(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
-def informative(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str], dict[str, int]]:
-    """Returns recordings of one kind of object without rows that say nothing on its force, notes on these
-    rows, and their numbers: repeated rows, wrong readings, and rows far from the contact."""
-    kept, notes, dropped = list(recordings), list[str](), {"repeated": 0, "wrong reading": 0, "approach": 0}
+class Informative:
+    """Recordings without rows that say nothing on the force of their object, and which rows these are.
 
-    def drop(number: int, rows: NDArray[np.bool_], name: str, text: str) -> None:
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Recordings of one kind of object.
+    """
+
+    def __init__(self, recordings: Sequence[Recording]) -> None:
+        self.recordings = list(recordings)
+        self.notes: list[str] = []
+        """Sentences on dropped rows"""
+        self.dropped: dict[str, int] = {}
+        """Number of dropped rows, by the reason"""
+        self._row = [np.arange(len(each)) for each in recordings]
+        """Number of each row of each recording before any was dropped"""
+        self._all = [len(each) for each in recordings]
+        for number, recording in enumerate(recordings):
+            self._drop(
+                number, repeated_rows(recording), "repeated", "repeat the previous row and were dropped"
+            )
+        self.drop_wrong_readings()
+        deepest = max(float(each.position.max()) for each in self.recordings)
+        for number, recording in enumerate(self.recordings):
+            approach = roles_of(recording, deepest) == Role.APPROACH
+            self._drop(number, approach, "approach", "are far from the contact and were dropped")
+
+    def drop_wrong_readings(self, residuals: Sequence[Float1D] | None = None) -> bool:
+        """Drops rows with a wrong reading, and returns True if there are any. With the residuals (n,) of a
+        model for each recording, these are compared in place of the forces."""
+        before = len(self.notes)
+        for number, recording in enumerate(self.recordings):
+            residual = None if residuals is None else residuals[number]
+            path, position, force = recording.motion.position, recording.position, recording.force
+            wrong = wrong_readings(path, position, force, recording.inputs.T, residual)
+            force_unit, position_unit = recording.file_unit("force"), recording.file_unit("position")
+            named = ", ".join(
+                f"row {self._row[number][row]}: {force_unit.text(force[row])} at "
+                f"{position_unit.text(position[row])}"
+                for row in np.flatnonzero(wrong)[:MOST_NAMED_ROWS]
+            )
+            more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED_ROWS else ""
+            text = f"are wrong readings and were dropped: {named}{more}"
+            self._drop(number, wrong, "wrong reading", text)
+        return len(self.notes) > before
+
+    def _drop(self, number: int, rows: NDArray[np.bool_], name: str, text: str) -> None:
+        """Drops rows (n,) of one recording."""
         if rows.any():
-            where = f"recording {number + 1}: " if len(kept) > 1 else ""
-            count, of = int(np.count_nonzero(rows)), len(recordings[number])
-            notes.append(f"{where}{count} of {of} rows {text}.")
-            dropped[name] += count
-            kept[number] = kept[number].without(rows)
-
-    for number, recording in enumerate(recordings):
-        again = repeated_rows(recording)
-        drop(number, again, "repeated", "repeat the previous row and were dropped")
-    kept, of_wrong, count = without_wrong_readings(kept)
-    notes += of_wrong
-    dropped["wrong reading"] = count
-    deepest = max(float(each.position.max()) for each in kept)
-    for number, recording in enumerate(kept):
-        approach = roles_of(recording, deepest) == Role.APPROACH
-        drop(number, approach, "approach", "are far from the contact and were dropped")
-    return kept, notes, {name: count for name, count in dropped.items() if count}
-
-
-def without_wrong_readings(
-    recordings: Sequence[Recording], residuals: Sequence[Float1D] | None = None
-) -> tuple[list[Recording], list[str], int]:
-    """Returns recordings without rows with a wrong reading, notes that name them, and their number. With the
-    residuals of a model, these are compared in place of the forces."""
-    kept: list[Recording] = []
-    notes, count = list[str](), 0
-    for number, recording in enumerate(recordings):
-        residual = None if residuals is None else residuals[number]
-        path, position, force = recording.motion, recording.position, recording.force
-        wrong = wrong_readings(path.position, position, force, recording.inputs.T, residual)
-        kept.append(recording.without(wrong) if wrong.any() else recording)
-        if not wrong.any():
-            continue
-        rows = np.flatnonzero(wrong)
-        force_unit, position_unit = recording.file_unit("force"), recording.file_unit("position")
-        named = ", ".join(
-            f"row {path.rows[row]}: {force_unit.text(force[row])} at {position_unit.text(position[row])}"
-            for row in rows[:MOST_NAMED_ROWS]
-        )
-        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
-        where = f"recording {number + 1}: " if len(recordings) > 1 else ""
-        notes.append(
-            f"{where}{len(rows)} of {len(path.rows)} rows are wrong readings and were dropped: {named}{more}."
-        )
-        count += len(rows)
-    return kept, notes, count
+            where = f"recording {number + 1}: " if len(self.recordings) > 1 else ""
+            count = int(np.count_nonzero(rows))
+            self.notes.append(f"{where}{count} of {self._all[number]} rows {text}.")
+            self.dropped[name] = self.dropped.get(name, 0) + count
+            self.recordings[number] = self.recordings[number].without(rows)
+            self._row[number] = self._row[number][~rows]
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
