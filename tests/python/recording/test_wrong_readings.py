@@ -250,4 +250,6 @@ def test_a_wrong_reading_on_a_steep_part_is_found_with_the_model() -> None:
 @pytest.mark.parametrize("row", [0, 1, 2, -3, -2, -1])
 def test_the_first_and_the_last_rows_are_not_judged_by_rows_on_one_side(row: int) -> None:
     """A steep end of three rows, as of a contact or a wall, looks the same."""
-    assert wrong_rows(PRESS, changed(FORCE, {row % len(FORCE): float(FORCE[row]) + 2.0})) == []
+    at = row % len(FORCE)
+    assert wrong_rows(PRESS, changed(FORCE, {at: float(FORCE[at]) + 0.5 * np.ptp(FORCE)})) == []
+    assert wrong_rows(PRESS, changed(FORCE, {at: float(FORCE[at]) + 20.0 * np.ptp(FORCE)})) == [at]

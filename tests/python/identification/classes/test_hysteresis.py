@@ -153,12 +153,12 @@ def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
 
 
 def test_the_verdict_counts_rows_behind_a_turn_as_the_fit_does() -> None:
-    """The friction reverses over 8 % of the travel as no play operator does; elsewhere only noise is left."""
+    """The friction reverses over a tenth of the travel as no play operator does; elsewhere only noise is left."""
     time, noise = np.arange(0.0, 8.0, 0.002), 0.001
     x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
     way = np.where(np.gradient(x) > 0.0, 1.0, -1.0)
     since = np.where(way > 0.0, x, 1.0 - x)
-    side = way * np.where(time < 1.0, 1.0, 1.0 - 2.0 * np.exp(-((since / 0.06) ** 5)))
+    side = way * np.where(time < 1.0, 1.0, 1.0 - 2.0 * np.exp(-((since / 0.08) ** 5)))
     force = 0.02 * x + 0.1 * side + np.random.default_rng(0).normal(0.0, noise, len(x))
     model = identify(Recording.from_arrays(x, force, time))
     assert model.hysteretic
@@ -166,5 +166,5 @@ def test_the_verdict_counts_rows_behind_a_turn_as_the_fit_does() -> None:
     assert model.verdict.level == "good"
     (note,) = (each for each in model.notes["identification"] if each.startswith("Rows behind turns"))
     of_all, settled = map(float, re.findall(r"NRMSE (\S+) on all rows, (\S+) with", note)[0])
-    assert of_all == pytest.approx(model.fit.nrmse, rel=0.01)
-    assert settled * float(np.std(force)) == pytest.approx(noise, rel=0.1)
+    assert of_all == float(f"{model.fit.nrmse:.2g}")
+    assert settled * float(np.std(force)) == pytest.approx(noise, rel=0.3)
