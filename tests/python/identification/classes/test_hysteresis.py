@@ -153,7 +153,7 @@ def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
 
 
 def test_the_verdict_counts_rows_behind_a_turn_as_the_fit_does() -> None:
-    """The friction reverses over a tenth of the travel as no play operator does; elsewhere only noise is left."""
+    """The friction reverses over a tenth of the travel as no play operator does; noise is left elsewhere."""
     time, noise = np.arange(0.0, 8.0, 0.002), 0.001
     x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
     way = np.where(np.gradient(x) > 0.0, 1.0, -1.0)
