@@ -4,7 +4,7 @@
 A recording is a motion. Its information on a force over position is in the distance that the tool travels,
 not in the number of rows: a tool that waits repeats one position, and its force changes with time, not with
 position. A row is a wait if the tool moves less, since the rows before, than a twentieth of what it moves
-nearby.
+nearby in the same time.
 """
 
 from __future__ import annotations

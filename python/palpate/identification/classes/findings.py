@@ -329,7 +329,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     settled = best.settled
     if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":
         notes.append(
-            f"Rows behind turns share an error, because friction reverses there, and count less in the fit: "
+            "Rows behind turns share an error, because friction reverses there, and count less in the fit: "
             f"NRMSE {error.nrmse:.2g} on all rows, {settled.nrmse:.2g} with these weights."
         )
     band, checked = band_with_check(best)

@@ -164,7 +164,7 @@ class Velocity(ModelClass):
             force_unit=data.force_unit,
         )
         both = select(over_both, self._selection.options)
-        weight = below.share[rows] if data.weight is None else (below.share * data.weight)[rows]
+        weight = below.fit_weight[rows]
         before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
         share = 1.0 - after / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None

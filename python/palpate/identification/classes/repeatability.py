@@ -138,7 +138,7 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     compressor = Compressor(
         data.box,
         force,
-        weight=best.share if data.weight is None else best.share * data.weight,
+        weight=best.fit_weight,
         max_positions=best.rows.cells,
         limits=data.limits,
     )

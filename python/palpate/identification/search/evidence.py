@@ -234,6 +234,11 @@ class Candidate:
         return np.ones(len(self.data.force)) if self.strokes is None else self.strokes.share
 
     @property
+    def fit_weight(self) -> Float1D:
+        """(n,) weight of every row in the fit: its share times the samples that it represents."""
+        return self.share if self.data.weight is None else self.share * self.data.weight
+
+    @property
     def play_radius(self) -> float | None:
         """[box]"""
         return None if self.strokes is None else self.strokes.play_radius
