@@ -19,7 +19,7 @@ from ..model import Model
 from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
-from ..recording.roles import Informative, role_counts
+from ..recording.roles import Informative, role_counts, unused_rows
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
@@ -156,9 +156,11 @@ def identify(
                 fitted = recordings = informative.recordings
                 network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
         settings = chosen
-        network = replace(network, notes=(*informative.notes, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
+    # A memory is fitted to the rows that wait as well.
+    unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
+    network = replace(network, notes=(*informative.notes, *unused, *sections, *network.notes))
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     known = rows.order if rows.side is None else rows.side

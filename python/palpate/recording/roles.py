@@ -45,6 +45,15 @@ further away, however long the approach is."""
 MOST_NAMED_ROWS = 3
 """Largest number of wrong readings that a note lists."""
 
+WRONG_READING = "wrong reading"
+
+DROPPED = {
+    "repeated": "repeat the previous row and were dropped",
+    WRONG_READING: "are wrong readings and were dropped",
+    "approach": "are far from the contact and were dropped",
+}
+"""What is wrong with the rows that are dropped for a reason, for texts."""
+
 
 def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     """Returns the role of each row (n,) as the number of a :class:`Role`, from position and force in recorded
@@ -97,51 +106,64 @@ class Informative:
 
     def __init__(self, recordings: Sequence[Recording]) -> None:
         self.recordings = list(recordings)
-        self.notes: list[str] = []
-        """Sentences on dropped rows"""
-        self.dropped: dict[str, int] = {}
-        """Number of dropped rows, by the reason"""
-        self._row = [np.arange(len(each)) for each in recordings]
-        """Number of each row of each recording before any was dropped"""
-        self._all = [len(each) for each in recordings]
+        self._given = tuple(recordings)
+        self._kept = [np.arange(len(each)) for each in recordings]
+        """Rows of each given recording that are left"""
+        self._dropped: dict[tuple[int, str], NDArray[np.intp]] = {}
+        """Rows that were dropped, by the number of the recording and the reason"""
         for number, recording in enumerate(recordings):
-            self._drop(
-                number, repeated_rows(recording), "repeated", "repeat the previous row and were dropped"
-            )
+            self._drop(number, repeated_rows(recording), "repeated")
         self.drop_wrong_readings()
         deepest = max(float(each.position.max()) for each in self.recordings)
         for number, recording in enumerate(self.recordings):
-            approach = roles_of(recording, deepest) == Role.APPROACH
-            self._drop(number, approach, "approach", "are far from the contact and were dropped")
+            self._drop(number, roles_of(recording, deepest) == Role.APPROACH, "approach")
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Number of dropped rows, by the reason."""
+        reasons = dict.fromkeys(reason for _, reason in self._dropped)
+        return {
+            each: sum(len(rows) for (_, why), rows in self._dropped.items() if why == each)
+            for each in reasons
+        }
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on dropped rows."""
+        found = []
+        for (number, reason), rows in self._dropped.items():
+            where = f"recording {number + 1}: " if len(self._given) > 1 else ""
+            text = f"{where}{len(rows)} of {len(self._given[number])} rows {DROPPED[reason]}"
+            if reason == WRONG_READING:
+                named = [self._reading(number, row) for row in np.sort(rows)[:MOST_NAMED_ROWS].tolist()]
+                text += f": {', '.join(named)}{', and others' * (len(rows) > MOST_NAMED_ROWS)}"
+            found.append(f"{text}.")
+        return found
 
     def drop_wrong_readings(self, residuals: Sequence[Float1D] | None = None) -> bool:
         """Drops rows with a wrong reading, and returns True if there are any. With the residuals (n,) of a
         model for each recording, these are compared in place of the forces."""
-        before = len(self.notes)
+        before = self.dropped.get(WRONG_READING, 0)
         for number, recording in enumerate(self.recordings):
             residual = None if residuals is None else residuals[number]
             path, position, force = recording.motion.position, recording.position, recording.force
             wrong = wrong_readings(path, position, force, recording.inputs.T, residual)
-            force_unit, position_unit = recording.file_unit("force"), recording.file_unit("position")
-            named = ", ".join(
-                f"row {self._row[number][row]}: {force_unit.text(force[row])} at "
-                f"{position_unit.text(position[row])}"
-                for row in np.flatnonzero(wrong)[:MOST_NAMED_ROWS]
-            )
-            more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED_ROWS else ""
-            text = f"are wrong readings and were dropped: {named}{more}"
-            self._drop(number, wrong, "wrong reading", text)
-        return len(self.notes) > before
+            self._drop(number, wrong, WRONG_READING)
+        return self.dropped.get(WRONG_READING, 0) > before
 
-    def _drop(self, number: int, rows: NDArray[np.bool_], name: str, text: str) -> None:
+    def _drop(self, number: int, rows: NDArray[np.bool_], reason: str) -> None:
         """Drops rows (n,) of one recording."""
         if rows.any():
-            where = f"recording {number + 1}: " if len(self.recordings) > 1 else ""
-            count = int(np.count_nonzero(rows))
-            self.notes.append(f"{where}{count} of {self._all[number]} rows {text}.")
-            self.dropped[name] = self.dropped.get(name, 0) + count
+            before = self._dropped.get((number, reason), np.empty(0, dtype=np.intp))
+            self._dropped[number, reason] = np.append(before, self._kept[number][rows])
+            self._kept[number] = self._kept[number][~rows]
             self.recordings[number] = self.recordings[number].without(rows)
-            self._row[number] = self._row[number][~rows]
+
+    def _reading(self, number: int, row: int) -> str:
+        """Returns the force and the position of a row of a given recording as text."""
+        given = self._given[number]
+        force, position = given.file_unit("force"), given.file_unit("position")
+        return f"row {row}: {force.text(given.force[row])} at {position.text(given.position[row])}"
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:

@@ -234,16 +234,16 @@ def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
 
 
 def test_a_wrong_reading_on_a_steep_part_is_found_with_the_model() -> None:
-    """The force changes more from row to row than the reading is wrong."""
+    """The force changes more from row to row than the reading is wrong. One note names it and the others."""
     x = press_and_release(200)
     y = 40.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))
-    y[150] += 3.0
-    assert wrong_rows(x, y) == []
+    y[[150, 250]] += [3.0, 900.0]
+    assert wrong_rows(x, y) == [250]
     model = palpate.identify(x, y)
-    assert any(
-        "1 of 400 rows are wrong readings and were dropped: row 150" in n
-        for n in model.notes["identification"]
-    )
+    (note,) = (each for each in model.notes["identification"] if "wrong reading" in each)
+    assert note.startswith("2 of 400 rows are wrong readings and were dropped: row 150: ")
+    assert ", row 250: 1020 at " in note
+    assert model.notes["roles"]["wrong reading"] == 2
     assert model.fit.nrmse < 1e-3
 
 

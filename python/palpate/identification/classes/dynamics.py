@@ -166,8 +166,8 @@ class Dynamics:
         allowed: tuple[str, ...] = TERMS
         if (spread := self._spread_of_speeds()) < LEAST_SPEED_SPREAD:
             reason = (
-                f"the speed was nearly constant: it varies by {100 * spread:.2g} %, at least "
-                f"{100 * LEAST_SPEED_SPREAD:.2g} % is needed; record slow and fast strokes"
+                f"the speed was nearly constant: it varies by {100 * spread:.2g} %, slow and "
+                f"fast strokes with at least {100 * LEAST_SPEED_SPREAD:.2g} % are needed"
             )
             decisions.append(Decision("damping", "not tested", reason))
             allowed = ("mass",)

@@ -436,8 +436,8 @@ def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iter
         if constant and not any((roles_of(part) == Role.HOLD).any() for part in recordings):
             yield usable(
                 "the rows do not show whether the force relaxes with time or depends on earlier motion, as "
-                f"friction and plasticity do: the tool never waits in contact, and {decision.reason}, or a "
-                "pause in contact"
+                f"friction and plasticity do: the tool never waits in contact, and {decision.reason}. Cure: "
+                "wait in contact for some seconds, or record slow and fast strokes"
             )
 
 

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, ordered_strokes, pieces, velocity
-from ...recording.roles import Role, roles_of, unused_rows
+from ...recording.roles import Role, roles_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
@@ -315,7 +315,6 @@ def rows_of(
     if not fitted.all():
         shown = positions[fitted]
         corners = shown.min(axis=0), shown.max(axis=0)
-        notes = (*notes, unused_rows(role))
     first_equal = _first_equal(recordings)
     repeats = None
     if len(set(first_equal)) > 1:

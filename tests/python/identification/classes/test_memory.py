@@ -70,6 +70,8 @@ def test_known_branches_are_found(tau: list[float]) -> None:
     assert model.fit.nrmse == pytest.approx(0.005, rel=0.1)
     assert any("memory: accepted" in line for line in model.notes["model_selection"])
     assert any("s are resolved by the recordings" in line for line in model.notes["identification"])
+    assert model.notes["roles"]["wait in contact"] > 0
+    assert not any("not fitted" in line for line in model.notes["identification"]), "a memory fits all rows"
 
 
 def pressed_twice() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -242,7 +244,7 @@ def test_plasticity_at_one_speed_is_not_stated_to_be_relaxation() -> None:
     (reason,) = (each for each in model.verdict.reasons if "relaxes with time" in each)
     assert "depends on earlier motion" in reason
     assert "speed was nearly constant" in reason
-    assert reason.endswith("record slow and fast strokes, or a pause in contact")
+    assert reason.endswith("Cure: wait in contact for some seconds, or record slow and fast strokes")
     # both errors are those of the recorded rows, not of the curve of the force at rest
     assert model.notes["error_rows"] == len(x)
     assert model.notes["left_out_nrmse"] < 1.5 * model.fit.nrmse
