@@ -423,7 +423,7 @@ def _require_unit_of_period(unit: str, position_unit: str) -> None:
         )
 
 
-_LEFT_OUT = ("rows are not fitted", "rows repeat the previous row", "rows are wrong readings")
+_LEFT_OUT = ("rows are not fitted", "rows repeat the previous reading", "rows are wrong readings")
 """Parts of the notes of an identification that name rows that it left out."""
 
 

@@ -36,6 +36,8 @@ class Role(IntEnum):
     """The tool waits without contact, close to the object"""
     HOLD = 3
     """The tool waits in contact"""
+    REPEATED = 4
+    """The row repeats the reading of a sensor that is slower than the recorder"""
 
 
 AIR_MARGIN = 0.1
@@ -48,7 +50,7 @@ MOST_NAMED_ROWS = 3
 WRONG_READING = "wrong reading"
 
 DROPPED = {
-    "repeated": "repeat the previous row and were dropped",
+    "repeated": "repeat the previous reading and were dropped",
     WRONG_READING: "are wrong readings and were dropped",
     "approach": "are far from the contact and were dropped",
 }
@@ -63,12 +65,13 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     object. A recording with further inputs, or whose rows are not in the order of a motion, has only moving
     rows.
     """
-    role = np.full(len(recording), Role.MOVING, dtype=np.int8)
+    role = np.where(repeated_rows(recording), Role.REPEATED, Role.MOVING).astype(np.int8)
     of_motion = None if recording.input_names else waits(recording.motion.position, recording.motion.time)
     if of_motion is None or (waiting := of_motion[recording.motion.rows]).all():
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])
+    waiting &= role == Role.MOVING
     role[waiting] = np.where(position <= contact, Role.REST, Role.HOLD)[waiting]
     if deepest is not None:
         role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
@@ -80,6 +83,7 @@ ROLE_NAMES = {
     Role.APPROACH: "approach",
     Role.REST: "wait in air",
     Role.HOLD: "wait in contact",
+    Role.REPEATED: "repeat the previous reading",
 }
 """What the rows of each role do, for texts."""
 
@@ -112,7 +116,7 @@ class Informative:
         self._dropped: dict[tuple[int, str], NDArray[np.intp]] = {}
         """Rows that were dropped, by the number of the recording and the reason"""
         for number, recording in enumerate(recordings):
-            self._drop(number, repeated_rows(recording), "repeated")
+            self._drop(number, roles_of(recording) == Role.REPEATED, "repeated")
         self.drop_wrong_readings()
         deepest = max(float(each.position.max()) for each in self.recordings)
         for number, recording in enumerate(self.recordings):

@@ -445,8 +445,8 @@ def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
     assert main(["identify", "press.csv", "-o", "m.json", *arguments]) == 0
     printed = capsys.readouterr().out
     assert (
-        "rows                 154 of 455 rows repeat the previous row and were dropped. 2 of 455 rows are "
-        "wrong readings and were dropped: row 205: 0 N at 1.342 mm, row 215: 200 N at 1.611 mm. "
+        "rows                 154 of 455 rows repeat the previous reading and were dropped. 2 of 455 rows "
+        "are wrong readings and were dropped: row 205: 0 N at 1.342 mm, row 215: 200 N at 1.611 mm. "
         "2 of 299 rows are not fitted: 2 wait in air\n"
     ) in printed
     assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n" in printed

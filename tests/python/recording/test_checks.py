@@ -171,20 +171,6 @@ def test_a_stroke_that_ends_early_is_reported() -> None:
     )
 
 
-@pytest.mark.parametrize("held", ["the force changes", "the position changes"])
-def test_held_columns_are_reported_with_their_period(held: str) -> None:
-    rows = rows_of("P2")
-    at = 8 * (np.arange(len(rows)) // 8)
-    wrong = replace(
-        rows,
-        f=rows.f[at] if "force" in held else rows.f,
-        x=rows.x[at] if "position" in held else rows.x,
-    )
-    (found,) = [sentence for sentence in sentences(wrong) if "only once" in sentence]
-    assert found.startswith(f"{held} only once in 8 rows")
-    assert ("--force-late-s 0.0035" in found) == (held == "the force changes")
-
-
 def test_waits_do_not_decide_whether_the_force_falls_with_position() -> None:
     random = np.random.default_rng(0)
     press = np.linspace(0.0, 4.0, 400)

@@ -21,7 +21,7 @@ from imperfect import (
     wall,
 )
 from palpate.identification.identify_files import identify_files
-from palpate.recording.checks.wrong_readings import wrong_readings
+from palpate.recording.checks.wrong_readings import repeated_rows, wrong_readings
 from palpate.recording.roles import Informative
 
 N = 10_000
@@ -115,6 +115,57 @@ def test_short_fast_motion_after_a_long_rest_stays() -> None:
 def test_strokes_after_a_long_exact_rest_stay() -> None:
     at_rest = np.zeros(5000)
     assert wrong_rows(np.r_[at_rest, PRESS[::2]], np.r_[at_rest, 2.0 * PRESS[::2]]) == []
+
+
+def at_a_slower_rate(values: np.ndarray, rows: float) -> np.ndarray:
+    """Returns values as a sensor gives them that measures once in a number of rows."""
+    measured = np.unique(np.ceil(np.arange(0.0, len(values), rows)).astype(int))
+    return values[measured[np.searchsorted(measured, np.arange(len(values)), side="right") - 1]]
+
+
+@pytest.mark.parametrize("rows", [2, 2.5, 8])
+@pytest.mark.parametrize("slower", ["force", "position"])
+def test_rows_that_repeat_a_slower_sensor_are_neither_fitted_nor_compared(slower: str, rows: float) -> None:
+    """A repeated reading is late: press and release of a spring without loss would differ."""
+    random = np.random.default_rng(0)
+    x = 2.0 - 2.0 * np.cos(np.linspace(0.0, 2.0 * np.pi, 1200)) + random.normal(0.0, 1e-4, 1200)
+    force = 3.0 * x**2 + random.normal(0.0, 0.01, len(x))
+    late = {
+        "position": at_a_slower_rate(x, rows) if slower == "position" else x,
+        "force": at_a_slower_rate(force, rows) if slower == "force" else force,
+    }
+    recording = palpate.Recording.from_arrays(**late)
+    model = palpate.identify(recording)
+    assert model.kind == "position"
+    at = np.linspace(0.1, 0.9 * x.max(), 100)
+    np.testing.assert_allclose(model.force(at), 3.0 * at**2, atol=0.02)
+    expected = len(x) - len(np.unique(np.ceil(np.arange(0.0, len(x), rows))))
+    assert model.notes["roles"]["repeated"] == pytest.approx(expected, rel=0.01)
+    assert model.verdict.level == "good"
+    check = palpate.verify(model, recording)
+    assert check.n == pytest.approx(len(x) - expected, rel=0.05)
+    assert check.nrmse == pytest.approx(model.fit.nrmse, rel=0.1)
+
+
+@pytest.mark.parametrize("noise_steps", [0.0, 0.2, 1.0])
+def test_a_coarse_sensor_is_not_a_slower_one(noise_steps: float) -> None:
+    random, step = np.random.default_rng(1), 0.2
+    x = press_and_release(3000)
+    force = np.round((3.0 * x**2 + noise_steps * step * random.normal(size=len(x))) / step) * step
+    assert not repeated_rows(palpate.Recording.from_arrays(x, force)).any()
+    position = np.round(x / 0.01) * 0.01
+    assert not repeated_rows(
+        palpate.Recording.from_arrays(position, 3.0 * x**2 + random.normal(0.0, 0.01, len(x)))
+    ).any()
+
+
+def test_a_relaxation_hold_keeps_its_rows_when_the_position_sensor_is_slower() -> None:
+    random = np.random.default_rng(2)
+    x = np.r_[np.linspace(0.0, 1.0, 500), np.full(2000, 1.0)] + random.normal(0.0, 1e-4, 2500)
+    hold = np.exp(-np.arange(2000) / 500.0)
+    force = np.r_[np.linspace(0.0, 1.0, 500), 0.7 + 0.3 * hold] + random.normal(0.0, 1e-3, 2500)
+    recording = palpate.Recording.from_arrays(at_a_slower_rate(x, 4), force)
+    assert np.count_nonzero(~repeated_rows(recording)[500:]) == 500
 
 
 def test_wrong_reading_of_a_further_input_is_dropped() -> None:

@@ -18,7 +18,7 @@ from .cells import Checked
 from .gaps import position_gaps
 from .ranges import implausible_range
 from .recordings import scale_findings
-from .sensors import clipped_force, repeated_samples
+from .sensors import clipped_force
 from .signs import force_without_contact, mirrored_stroke, moved_zero, reversed_sign
 
 if TYPE_CHECKING:
@@ -89,12 +89,6 @@ CHECKS = (
         clipped_force,
         "a force sensor or converter at the end of its range; rounding alone repeats a value at most 3 times",
         {"positions": 3, "ratio": 5.0, "near_share": 0.1, "contact_share": 0.2},
-    ),
-    Check(
-        "repeated samples",
-        repeated_samples,
-        "a sensor that is slower than the recorder",
-        {"regular_share": 0.8, "change_ratio": 1.5},
     ),
     Check(
         "positions without rows",

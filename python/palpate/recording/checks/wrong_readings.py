@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
-from ..motion import strokes_from_order
+from ..motion import TURN_STEPS, strokes_from_order
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -36,16 +36,34 @@ REPEATED_ROWS_SHARE = 1.0 / 3.0
 """Share of rows that equal the previous row, above which they are repeated [-]: a coarse sensor gives fewer
 equal rows."""
 
+HELD_SHARE = 0.8
+"""Share of the values of a slower sensor that occur in several successive rows [-]: a coarse sensor gives
+more single rows."""
+
 
 def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
-    """Returns True (n,) for rows that repeat the previous row: a sensor that is slower than the recorder
-    measures only the first one."""
-    columns = [recording.position, recording.force, *recording.inputs.T]
-    if recording.direction is not None:
-        columns.append(recording.direction)
+    """Returns True (n,) for rows that repeat the reading of a sensor that is slower than the recorder: only
+    the first row with a reading was measured, and the others are late."""
+    measured = [recording.position, recording.force, *recording.inputs.T]
+    columns = measured if recording.direction is None else [*measured, recording.direction]
     again = np.zeros(len(recording), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
-    return np.asarray(again & (again.mean() > REPEATED_ROWS_SHARE))
+    again &= again.mean() > REPEATED_ROWS_SHARE
+    held, slowest = max(((_rows_held(each), each) for each in measured), key=lambda each: each[0])
+    index = np.arange(len(again))
+    begins = np.maximum.accumulate(np.where(np.diff(slowest, prepend=np.nan) != 0.0, index, 0))
+    return np.asarray(again | ((index - begins) % held > 0))
+
+
+def _rows_held(values: Float1D) -> int:
+    """Returns the number of rows for which a slower sensor keeps a value (n,); 1 for a sensor that is not
+    slower. The values of a coarse sensor mostly change by one step."""
+    steps = np.abs(np.diff(values))
+    rows = np.diff(np.flatnonzero(steps))
+    steps = steps[steps > 0.0]
+    if len(rows) < LOCAL_ROWS or np.median(steps) <= TURN_STEPS * steps.min():
+        return 1
+    return 1 + int(np.median(rows)) if np.mean(rows > 1) >= HELD_SHARE else 1
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
