@@ -31,7 +31,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.identification.noise import CASES, line
 from bench.identification.ordinary import ALLOWED_RATIO, Truth
+from bench.identification.ordinary_objects import Array
 from bench.identification.ordinary_recordings import drawn
+from bench.identification.problems import problem, spring_wall
 from bench.identification.real_data import EVERY, SETS
 from bench.studies import count, markdown_table, measured_data, write_results
 
@@ -41,7 +43,8 @@ from palpate.baselines import comparable
 from palpate.identification.data.strokes import weights_behind_turns
 from palpate.recording import checks
 from palpate.recording.checks import Check
-from palpate.recording.motion import strokes_from_order, velocity
+from palpate.recording.motion import strokes_from_order, velocity, waits
+from palpate.recording.roles import Informative
 from palpate.verdict import Finding
 from palpate.verification.metrics import normalised, root_mean_square
 
@@ -170,6 +173,13 @@ def _not_near(path: Any, order: Any, residual: Any, touched: Any, least: float, 
     return weights_behind_turns(path, order, residual, touched, least, 0)
 
 
+class OfForces(Informative):
+    """Recordings whose wrong readings are found in the forces alone."""
+
+    def drop_wrong_readings(self, residuals: Any = None) -> bool:
+        return residuals is None and super().drop_wrong_readings()
+
+
 def _no_waits(position: Any, time: Any = None) -> Any:
     return None if strokes_from_order(position) is None else _none(position)
 
@@ -228,6 +238,10 @@ RULES = (
         "repeated_rows",
         lambda recording: _none(recording.force),
     ),
+    Rule("rows of a slower sensor", f"{CHECKS}.wrong_readings", "_rows_held", _one),
+    Rule("residuals show wrong readings", "identification.identify", "Informative", OfForces),
+    Rule("waits are judged by time", "recording.roles", "waits", lambda x, time=None: waits(x)),
+    Rule("play follows over a gap", f"{DATA}.rows", "ordered_strokes", _nothing),
     Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
@@ -299,6 +313,52 @@ def of_noise(case: str, draw: int) -> Fit:
     return Fit([recording], error, {})
 
 
+def joined_to_itself(draw: int) -> Recording:
+    """Returns a file that holds the rows of a spring with a wall five times."""
+    x, force = _wall(draw)
+    return Recording.from_arrays(np.tile(x, 5), np.tile(force, 5))
+
+
+def six_bits(draw: int) -> Recording:
+    """Returns a spring with a wall whose force was stored with 6 bits."""
+    x, force = _wall(draw)
+    step = float(np.ptp(force)) / 2**6
+    return Recording.from_arrays(x, step * np.round(force / step))
+
+
+def _wall(draw: int) -> tuple[Array, Array]:
+    x = problem("P1", draw).X[:2000, 0]
+    return x, spring_wall(x) + np.random.default_rng([39, draw]).normal(0.0, 0.002, len(x))
+
+
+def of_stored(stored: Callable[[int], Recording], draw: int) -> Fit:
+    """Returns a spring with a wall, stored in a way that looks like structure."""
+    recording = stored(draw)
+    x = np.linspace(recording.position.min(), recording.position.max(), 1000)
+    truth = spring_wall(x)
+    return Fit(
+        [recording], lambda model: float(normalised(root_mean_square(model.force(x) - truth), truth)), {}
+    )
+
+
+def of_slots(draw: int) -> Fit:
+    """Returns the torque of a motor with seven poles and twelve slots, identified with the period of one
+    pole."""
+    random, angle = np.random.default_rng([40, draw]), 2.0 * np.pi * np.arange(512) / 512
+
+    def torque(angle: Array) -> Array:
+        return np.sin(7.0 * angle) + 0.3 * np.cos(12.0 * angle)
+
+    recording = Recording.from_arrays(angle, torque(angle) + random.normal(0.0, 0.01, 512))
+    between = angle + 0.5 * angle[1]
+
+    def error(model: Model) -> float:
+        truth = torque(between)
+        return float(normalised(root_mean_square(model.force(between) - truth), truth))
+
+    return Fit([recording], error, {"period": 2.0 * np.pi / 7.0})
+
+
 def of_gap(draw: int) -> Fit:
     """Returns a draw of the bench of ordinary recordings that has no rows in a part of the travel."""
     _, rows = drawn(draw)
@@ -367,6 +427,11 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
     number `seed` on, and a fifth of them with a gap; `files` is also the number of draws of each noise."""
     found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(seed, seed + draws)]
     found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
+    for draw in range(files):
+        found += [
+            (f"{form.__name__}, draw {draw}", of_stored, form, draw) for form in (joined_to_itself, six_bits)
+        ]
+        found.append((f"poles and slots, draw {draw}", of_slots, draw))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found
