@@ -350,7 +350,7 @@ def of_slots(draw: int) -> Fit:
         return np.sin(7.0 * angle) + 0.3 * np.cos(12.0 * angle)
 
     recording = Recording.from_arrays(angle, torque(angle) + random.normal(0.0, 0.01, 512))
-    between = angle + 0.5 * angle[1]
+    between = random.uniform(0.0, 2.0 * np.pi, 1000)
 
     def error(model: Model) -> float:
         truth = torque(between)
