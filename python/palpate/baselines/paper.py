@@ -35,9 +35,9 @@ from ..recording import Recording
 MOST_STEPS = 300
 """Largest number of quasi-Newton steps."""
 
-LEAST_FALL = 0.004
-"""Decrease of the deviance (-2 log likelihood) below which a quasi-Newton step is too small to continue [-]:
-far below the penalty of one parameter."""
+STORED_STEPS = 100
+"""Number of steps from which the quasi-Newton method estimates the curvature: with 10 it needs more than ten
+times as many steps."""
 
 PERIOD_TOLERANCE = 0.01
 """Largest relative difference between the time step of a recording and that of the paper's filters [-]."""
@@ -205,7 +205,7 @@ def refine_all(problem: SeparableProblem, start: Solution) -> Solution:
             unknowns(-free, LEAST_DILATION * ones, -LARGEST_OVERHANG * ones),
             unknowns(free, finest, (1.0 + LARGEST_OVERHANG) * ones),
         ),
-        options={"maxiter": MOST_STEPS, "ftol": LEAST_FALL / problem.samples},
+        options={"maxiter": MOST_STEPS, "maxcor": STORED_STEPS, "ftol": 0.0},
     )
     moved = apart(found.x)[1]
     resolved = np.maximum(problem.finest(moved), LEAST_DILATION)
@@ -238,7 +238,8 @@ def paper_force(recording: Recording, *, mass: float, damping: float | None = No
     """Returns the recorded force (n,) minus that of an assumed mass and damping, F - m a - B_o v.
 
     The velocity v and the acceleration a are those of the paper's published differentiators: figure 11
-    without damping, figure 13 with it. They lag behind the motion from 2 Hz on.
+    without damping, figure 13 with it. They lag behind the motion from 2 Hz on. The paper's curve is
+    ``identify(recording.position, force, inputs="position")`` for this force.
 
     Parameters
     ----------
