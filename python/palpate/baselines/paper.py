@@ -45,10 +45,10 @@ PERIOD_TOLERANCE = 0.01
 
 @dataclass
 class PaperNetwork:
-    """f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c.x + b (paper eq. 4) as the paper identifies it.
+    """Identifies f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c.x + b (paper eq. 4) as the paper does.
 
-    Wavelets are selected from a frame (Zhang 1997), and BIC chooses their number. If `quasi_newton` is True,
-    one quasi-Newton method (L-BFGS-B, Byrd et al. 1995) then moves all parameters at once.
+    Selects wavelets from a frame (Zhang 1997); BIC chooses their number. If `quasi_newton` is True, a
+    quasi-Newton method (L-BFGS-B, Byrd et al. 1995) then moves all parameters at once.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class PaperNetwork:
     max_wavelets: int = IdentifyOptions.max_wavelets
 
     def __post_init__(self) -> None:
-        if self.selection not in SELECTIONS:
+        if self.selection not in [*SELECTIONS]:
             raise InputError(f"selection is {shown(self.selection)}: must be one of {', '.join(SELECTIONS)}")
 
     def fit(self, X: Float2D, y: Float1D) -> PaperNetwork:
@@ -258,7 +258,7 @@ def paper_force(recording: Recording, *, mass: float, damping: float | None = No
     """
     mass = number_of("mass", mass)
     if recording.time is None:
-        raise InputError("the recording has no time column, which the paper's filters need: give --time NAME")
+        raise InputError("the recording has no time, which the paper's filters need: read it with time=NAME")
     steps = np.diff(recording.time)
     if np.abs(steps / paper_sample_time_s - 1.0).max() > PERIOD_TOLERANCE:
         raise InputError(
