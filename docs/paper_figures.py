@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 import palpate
 from palpate._core.dynamics import environment_filters, paper_sample_time_s
+from palpate.baselines import paper_force
 from palpate.recording.sample import (
     ENCODER_STEP,
     FORCE_NOISE,
@@ -128,17 +129,16 @@ def draw_responses(to: Path) -> None:
 
 def draw_impedance(to: Path) -> None:
     """Figure 15: recorded force, and force over the position of the identified environment."""
-    published = palpate.SearchOptions(filters="paper-explicit", assumed_mass=MASS, assumed_damping=DAMPING)
     light = palpate.Scheme(structure="implicit", mass=0.01 * MASS, object_damping=0.01 * DAMPING)
     quick = (sample_recording(seed=1), sample_recording(seed=2))
     slow = (slowed(quick[0], SLOWER), slowed(quick[1], SLOWER))
     figure, axes = plt.subplots(1, 3, figsize=(6.4, 3.6), sharey=True)
-    for panel, title, (recording, fresh), options, scheme in (
-        (axes[0], "published, 0.2 to 2 Hz", quick, {"search": published}, None),
-        (axes[1], f"published, {SLOWER} times slower", slow, {"search": published}, None),
-        (axes[2], "static, implicit, light", quick, {}, light),
+    for panel, title, (recording, fresh), scheme in (
+        (axes[0], "published, 0.2 to 2 Hz", quick, None),
+        (axes[1], f"published, {SLOWER} times slower", slow, None),
+        (axes[2], "static, implicit, light", quick, light),
     ):
-        model = palpate.identify(recording, **options)
+        model = palpate.identify(recording) if scheme else published(recording)
         loop = force_driven(model, fresh, scheme)
         panel.plot(
             loop.recorded_position,
@@ -160,6 +160,14 @@ def draw_impedance(to: Path) -> None:
     axes[0].set_ylabel("force [N·m]")
     axes[0].legend(frameon=False)
     save(figure, to, "figure-15")
+
+
+def published(recording: palpate.Recording) -> palpate.Model:
+    """Returns one curve over position for the force without the paper's mass and damping."""
+    force = paper_force(recording, mass=MASS, damping=DAMPING)
+    return palpate.identify(
+        palpate.Recording.from_arrays(recording.position, force, units=recording.units), inputs="position"
+    )
 
 
 def slowed(recording: palpate.Recording, factor: int) -> palpate.Recording:

@@ -44,7 +44,7 @@ METHOD_STYLES = (
     ("D", "0.55"),
     *((marker, "white") for marker in "^v<>pP*Xhd8"),
 )
-"""Marker and its color: palpate, palpate's wavelet selection alone, its refinement alone, other methods."""
+"""Marker and its color: palpate, the paper's selection alone and with quasi-Newton, other methods."""
 
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
 

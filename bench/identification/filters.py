@@ -3,8 +3,8 @@
 
 python bench/identification/filters.py [--json FILE]
 
-The mode of the paper receives the true mass and damping, because it must assume them. The matched mode
-identifies them.
+The filters of the paper receive the true mass and damping, because they must assume them. The matched filters
+identify them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import argparse
 import sys
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.identification.moving import simulate_recording
 from bench.studies import count, write_results
 
-from palpate import Model, SearchOptions, identify
+from palpate import Model, identify
+from palpate.baselines import paper_force
 from palpate.recording import sample_force
 from palpate.recording.sample import LOWER, UPPER
 
@@ -31,29 +31,25 @@ MASS, DAMPING = 1e-3, 0.06
 FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Compared highest frequencies of the hand motion [Hz]; the lowest frequency is a tenth of the highest."""
 
-CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
-    "matched, mass": ({"mass": MASS}, {}),
-    "paper (figure 11), mass": (
-        {"mass": MASS},
-        {"search": SearchOptions(filters="paper-implicit", assumed_mass=MASS)},
-    ),
-    "matched, mass and damping": ({"mass": MASS, "damping": DAMPING}, {}),
-    "paper (figure 13), mass and damping": (
-        {"mass": MASS, "damping": DAMPING},
-        {"search": SearchOptions(filters="paper-explicit", assumed_mass=MASS, assumed_damping=DAMPING)},
-    ),
+CASES: dict[str, tuple[bool, dict[str, float]]] = {
+    "matched, mass": (False, {"mass": MASS}),
+    "paper (figure 11), mass": (True, {"mass": MASS}),
+    "matched, mass and damping": (False, {"mass": MASS, "damping": DAMPING}),
+    "paper (figure 13), mass and damping": (True, {"mass": MASS, "damping": DAMPING}),
 }
-"""Name of a case -> (mass and damping of the simulated object, options of its identification)."""
+"""Name of a case -> (True for the filters of the paper, mass and damping of the simulated object)."""
 
 
-def error(
-    object_properties: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int
-) -> float:
+def error(of_paper: bool, object_properties: dict[str, float], fastest_hz: float, draw: int) -> float:
     """Returns the NRMSE of the identified force f against the true force at positions of the recording."""
     recording = simulate_recording(
         draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **object_properties
     )
-    model = identify(recording, **options)
+    if of_paper:
+        force = paper_force(recording, **object_properties)
+        model = identify(recording.position, force, inputs="position")
+    else:
+        model = identify(recording)
     margin = 0.01 * (UPPER - LOWER)
     x = np.linspace(LOWER + margin, UPPER - margin, 2001)
     truth = sample_force(x)
@@ -76,9 +72,9 @@ def main() -> None:
     speeds = FASTEST_HZ[-count(len(FASTEST_HZ)) :]
     print(f"{'nrmse of f, the hand up to [Hz]':38}" + "".join(f"{hz:>10g}" for hz in speeds), flush=True)
     results = []
-    for name, (object_properties, settings) in CASES.items():
+    for name, (of_paper, object_properties) in CASES.items():
         errors = [
-            median(error(object_properties, settings, hz, draw) for draw in range(options.draws))
+            median(error(of_paper, object_properties, hz, draw) for draw in range(options.draws))
             for hz in speeds
         ]
         print(f"{name:38}" + "".join(f"{each:10.2e}" for each in errors), flush=True)

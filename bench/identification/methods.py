@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,9 @@ from sklearn.linear_model import OrthogonalMatchingPursuit, Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransformer
 
-from palpate import SearchOptions, WaveletNetworkRegressor
+from palpate import WaveletNetworkRegressor
 from palpate._core.model import wavelet_columns
+from palpate.baselines import PaperNetwork
 from palpate.identification.network.basis import truncated_frame
 
 Array = NDArray[np.float64]
@@ -56,12 +58,14 @@ class Method:
     most_draws: int = 10**9
 
 
-def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
-    """Returns palpate as a method with these options; palpate chooses the number of wavelets itself."""
+def network_method(
+    estimator: Callable[[], WaveletNetworkRegressor | PaperNetwork],
+) -> Callable[[Array, Array], Fitted]:
+    """Returns a method that fits a network; the estimator chooses the number of wavelets itself."""
 
     def fit(X: Array, y: Array) -> Fitted:
         start = time.perf_counter()
-        network = WaveletNetworkRegressor(**options).fit(X, y)
+        network = estimator().fit(X, y)
         seconds = time.perf_counter() - start
         return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
@@ -243,13 +247,9 @@ def mars(X: Array, y: Array) -> Fitted:
 
 
 METHODS = (
-    Method("palpate", palpate_with()),
-    Method("palpate, selection alone", palpate_with(search=SearchOptions(refine=False))),
-    Method(
-        "palpate, quasi-Newton",
-        palpate_with(search=SearchOptions(refinement="quasi-newton")),
-        most_rows=100_000,
-    ),
+    Method("palpate", network_method(WaveletNetworkRegressor)),
+    Method("paper, selection alone", network_method(PaperNetwork)),
+    Method("paper, quasi-Newton", network_method(partial(PaperNetwork, quasi_newton=True))),
     Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
     Method("make_lsq_spline", lsq_spline, inputs=(1,)),
     Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),

@@ -33,10 +33,11 @@ from threadpoolctl import threadpool_limits
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.identification.compare_methods import PALPATE, header, line, measure
-from bench.identification.methods import Array, Fitted, Method, Predict, palpate_with, tuned
+from bench.identification.methods import Array, Fitted, Method, Predict, network_method, tuned
 from bench.identification.problems import Problem
 from bench.studies import SCALE, count, markdown_table, write_results
 
+from palpate import WaveletNetworkRegressor
 from palpate.cli.figures import figure_file
 from palpate.plotting.look import grid
 
@@ -149,7 +150,7 @@ def gaussian_process(X: Array, y: Array) -> Fitted:
 
 
 METHODS = (
-    Method(PALPATE, palpate_with(), inputs=INPUTS),
+    Method(PALPATE, network_method(WaveletNetworkRegressor), inputs=INPUTS),
     Method("HistGradientBoosting", boosted_trees, inputs=INPUTS),
     Method("Nystrom + Ridge", nystrom, inputs=INPUTS),
     Method("Gaussian process", gaussian_process, inputs=INPUTS, most_draws=3),

@@ -383,10 +383,8 @@ def model_of(
         period=options.period,
         memory=None if network.memory is None else network.memory.memory(),
         play_radius=network.play_radius,
-        mass=network.mass if options.search.filters == "matched" else options.search.assumed_mass,
-        damping=options.search.assumed_damping
-        if options.search.filters == "paper-explicit"
-        else network.damping,
+        mass=network.mass,
+        damping=network.damping,
         fit=network.fit(),
         band=network.band,
         data=source,

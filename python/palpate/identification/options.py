@@ -23,9 +23,6 @@ RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
-    "selection": ("orthogonal", "residual", "backward"),
-    "refinement": ("projection", "quasi-newton"),
-    "filters": ("matched", "paper-implicit", "paper-explicit"),
     "below": ("auto", "free", "linear"),
     "above": ("linear", "free"),
 }
@@ -42,20 +39,11 @@ class SearchOptions:
         Naming the field, its value and the cure.
     """
 
-    selection: str = "orthogonal"
-    """How wavelets are selected from the frame: orthogonal (add the one that reduces the error most),
-    residual (add the one that fits the residual best) or backward (remove wavelets from a larger
-    selection)"""
     evidence: float = 10.0
     """Least decrease of the criterion for a more complex model class; 10 is very strong evidence [-]"""
     patience: int = 3
     """Growth of a network stops if this number of successive wavelets, times the number of inputs, was added
     without a lower criterion [-]"""
-    refine: bool = True
-    """True: dilations and translations are refined; False: they keep their values of the frame"""
-    refinement: str = "projection"
-    """How wavelets are refined: projection (variable projection, which solves the weights by least squares at
-    each step) or quasi-newton (steps of all parameters, as in the paper)"""
     refine_steps: int = 8
     """Largest number of refinement steps after each wavelet that was added or removed [-]"""
     final_steps: int = 30
@@ -72,15 +60,6 @@ class SearchOptions:
     max_positions: int = 1024
     """Largest number of distinct positions with one input; twice as many with two inputs, 64 times as many
     with three or more. More positions are gathered in about this number of cells [-]"""
-    filters: str = "matched"
-    """Filters for the forces of mass and damping: matched, or as published with an assumed mass:
-    paper-implicit (figure 11), paper-explicit (figure 13)"""
-    assumed_mass: float = 1e-3
-    """Object mass m that the filters paper-implicit and paper-explicit assume, as in the paper's figures
-    [force s^2/position]"""
-    assumed_damping: float = 0.5
-    """Object damping B_o that the filter paper-explicit assumes, as in the paper's figure 13 [force
-    s/position]"""
     play_radius: tuple[float, ...] = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.06)
     """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
     smallest and the largest is searched [share of the travel]"""
@@ -214,8 +193,6 @@ _LOWER_BOUND = {
     "frame_scale": 1.0,
     "frame_step": 0.0,
     "contact_share": -math.inf,
-    "assumed_mass": 0.0,
-    "assumed_damping": 0.0,
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
@@ -258,10 +235,6 @@ def _parsed(name: str, text: str) -> Any:
         cure = did_you_mean(name, known) or f"; its settings are {', '.join(known)}"
         raise InputError(f"search has no setting {name!r}{cure}")
     default = known[name]
-    if isinstance(default, str):
-        return text
-    if isinstance(default, bool):
-        return {"true": True, "false": False}.get(text.lower(), text)
     try:
         if isinstance(default, tuple):
             return tuple(float(part) for part in text.split(","))

@@ -180,7 +180,7 @@ def test_every_identification_setting_is_an_option_with_its_default() -> None:
 def test_settings_reach_the_identification(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sample_recording(3, 5.0).write(folder / "a.csv")
     arguments = ["identify", "a.csv", "-o", "m.json", "--max-wavelets", "2", "--inputs", "position"]
-    assert main([*arguments, "--slope-bounds", "-5", "30", "--search", "refine=false"]) == 0
+    assert main([*arguments, "--slope-bounds", "-5", "30", "--search", "patience=2"]) == 0
     model = load_model(folder / "m.json")
     assert model.n_wavelets <= 2
     assert model.slope(np.linspace(-0.2, 0.469, 2001)).max() <= 30.0 * (1 + 1e-6)

@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 
 from palpate import Recording, identify, load_model, read_recording
-from palpate.identification.options import SearchOptions
 
 Array = NDArray[np.float64]
 
@@ -84,12 +83,6 @@ def test_periods_on_top_of_each_other_do_not_make_orders_that_the_recording_does
     model = identify(Recording.from_arrays(angle, force + random.normal(0.0, 0.01, 512)), period=0.8943)
     rows_in_a_period = 512 * 0.8943 / TURN
     assert model.orders.max(initial=0.0) <= rows_in_a_period / 2.0
-
-
-@pytest.mark.parametrize("search", [{"refinement": "quasi-newton"}, {"selection": "backward"}])
-def test_the_methods_of_the_paper_have_no_harmonics(search: dict[str, str]) -> None:
-    model = identify(map_of_a_turn(200), period=TURN, max_wavelets=6, search=SearchOptions(**search))
-    assert model.harmonics == 0
 
 
 @pytest.mark.parametrize("criterion", ["aicc", "fresh", "perceptual"])

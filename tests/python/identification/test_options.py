@@ -12,30 +12,24 @@ from palpate.identification.options import SearchOptions, described_fields, opti
 
 def test_settings_of_the_search_are_read_from_texts_by_the_type_of_their_default() -> None:
     given = {
-        "selection": "backward",
-        "refine": "False",
         "patience": "5",
         "frame_scale": "1.5",
         "play_radius": "0.01,0.02",
     }
     read = SearchOptions.parsed(given)
-    assert read == SearchOptions(
-        selection="backward", refine=False, patience=5, frame_scale=1.5, play_radius=(0.01, 0.02)
-    )
+    assert read == SearchOptions(patience=5, frame_scale=1.5, play_radius=(0.01, 0.02))
     assert isinstance(read.patience, int)
-    assert SearchOptions.parsed({"refine": "true"}).refine is True
 
 
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
         ({"patiense": "5"}, "search has no setting 'patiense'"),
-        ({"xyz": "5"}, "its settings are selection, evidence, patience"),
+        ({"xyz": "5"}, "its settings are evidence, patience"),
         ({"patience": "5.5"}, "patience is '5.5': must be a whole number"),
         ({"frame_scale": "wide"}, "frame_scale is 'wide': must be a number"),
         ({"play_radius": "0.1;0.2"}, "play_radius is '0.1;0.2': must be numbers joined by commas"),
-        ({"refine": "perhaps"}, "refine is 'perhaps': must be True or False"),
-        ({"selection": "best"}, "selection is 'best': must be one of"),
+        ({"selection": "backward"}, "search has no setting 'selection'; its settings are evidence"),
     ],
 )
 def test_texts_without_a_setting_or_a_value_are_refused(given: dict[str, str], sentence: str) -> None:

@@ -133,7 +133,7 @@ class ClassSelection:
     @cached_property
     def motion(self) -> Dynamics | None:
         """Recorded motion, to which mass and damping are fitted; None if there is no time, the option inputs
-        is not "auto", the force has inputs besides position, or the filters are those of the paper."""
+        is not "auto", or the force has inputs besides position."""
         data = self.data
         decides = data.parts and len(data.names) == 1 and self.options.inputs == "auto"
         return Dynamics(data, self.options) if decides else None
@@ -157,7 +157,7 @@ class ClassSelection:
         If the constraints raise the RMS error by more than 1 %, the network is grown further on forces that
         keep the constraints. The new network is taken if the criterion prefers it.
         """
-        options, problem = self.options, candidate.problem
+        problem = candidate.problem
         bounds = self.bounds(problem)
         if problem.dimension > 1 or not bounds:
             return candidate
@@ -169,7 +169,7 @@ class ClassSelection:
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
-        if options.search.refine and worse and len(kept.basis) and not all(bound.seam for bound in bounds):
+        if worse and len(kept.basis) and not all(bound.seam for bound in bounds):
             moved = moved_to_bounds(problem, candidate.rows, candidate.solution, bounds)
             compatible = self.samples.problem(moved, candidate.strokes)
             regrown = self.grown(compatible, candidate.solution.basis, candidate.model_class)

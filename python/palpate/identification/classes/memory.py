@@ -265,7 +265,7 @@ def untested(
 ) -> str | None:
     """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
     tested."""
-    automatic = options.inputs == "auto" and options.period is None and options.search.filters == "matched"
+    automatic = options.inputs == "auto" and options.period is None
     in_order = all(part.time is not None or _in_order(part) for part in recordings)
     if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
         return ""

@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._core.model import most_wavelets
 from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
@@ -276,8 +275,7 @@ def rows_of(
     Raises
     ------
     InputError
-        A recording has no such input, the inputs are hysteresis together with further inputs, or the filters
-        of the paper do not fit the time.
+        A recording has no such input, or the inputs are hysteresis together with further inputs.
     """
     names = _input_names(recordings[0], options)
     found = [input_columns(recording, names) for recording in recordings]
@@ -302,11 +300,7 @@ def rows_of(
             for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
             for piece in pieces(recording)
         )
-    if options.search.filters == "matched":
-        forces = [part.force for part in recordings]
-    else:
-        forces, parts = [paper_target(part, options) for part in recordings], ()
-    force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    force = np.concatenate([part.force[rows] for part, rows in zip(recordings, kept, strict=True)])
     role = np.concatenate([roles_of(part)[rows] for part, rows in zip(recordings, kept, strict=True)])
     positions, fitted = np.concatenate(columns), role == Role.MOVING
     corners = None
@@ -417,36 +411,6 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
         )
     by_file_name = {recording.source.columns.get(known): known for known in recording.input_names}
     return ("position", *(by_file_name.get(name, name) for name in further))
-
-
-PERIOD_TOLERANCE = 0.01
-"""Largest relative difference between the time step of a recording and that of the paper's filters [-]."""
-
-
-def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
-    """Returns the force (n,) to which the network is fitted: recorded force minus that of the assumed mass
-    and damping.
-
-    Raises
-    ------
-    InputError
-        The recording has no time, or its sample time is not that of the paper's filters.
-    """
-    period = recording.sample_period
-    if recording.time is None or period is None:
-        raise InputError("the recording has no time column, which the paper's filters need: give --time NAME")
-    steps = np.diff(recording.time)
-    if np.abs(steps / paper_sample_time_s - 1.0).max() > PERIOD_TOLERANCE:
-        raise InputError(
-            f"the time steps of the recording are {steps.min():g} to {steps.max():g} s: the paper's filters "
-            f"need {paper_sample_time_s:g} s"
-        )
-    filters = environment_filters(options.search.filters.removeprefix("paper-"), "paper")
-    velocity = filters.g2.filter(recording.position - recording.position[0])
-    target = recording.force - options.search.assumed_mass * filters.g1.filter(velocity)
-    if options.search.filters == "paper-explicit":
-        target = target - options.search.assumed_damping * velocity
-    return np.asarray(target)
 
 
 COVERED_SHARE = 0.95

@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_jacobian, wavelet_steps
+from ..._core.model import wavelet_steps
 from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.compression import Compressed, HeldOutRows
@@ -523,104 +523,3 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
     finest = problem.finest(moved)
     alpha = np.clip(basis.alpha * np.exp(grow), LEAST_DILATION, np.maximum(finest, LEAST_DILATION))
     return replace(moved, alpha=np.where(used, alpha, basis.alpha)), finest
-
-
-QUASI_NEWTON_STEPS = 10
-"""Number of quasi-Newton steps for each requested step of variable projection: quasi-Newton steps are
-shorter."""
-
-
-def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
-    """Refines all fitted values of `start` by a quasi-Newton method; the result is never worse than `start`.
-
-    The unknowns are coefficients times the norm of their column over the root of the squared error of
-    `start`, log(alpha), and alpha_start beta, so that all have a similar size. Refinement ends when a step
-    lowers the deviance by less than a tenth of `tolerance`.
-    """
-    basis, d = start.basis, problem.dimension
-    if len(basis) == 0:
-        return start
-    size = np.sqrt(problem.total(start.rss))
-    norms = np.concatenate(
-        [
-            np.linalg.norm(design, axis=0).reshape(block.n_channels, -1)
-            for block, design in zip(problem.blocks, start.designs, strict=True)
-        ]
-    )
-    scale = size / np.maximum(norms, 1e-6 * norms.max())
-    coefficients = start.coefficients.size
-
-    def apart(unknown: Float1D) -> tuple[Float2D, Basis]:
-        table = unknown[:coefficients].reshape(scale.shape) * scale
-        log_alpha, shift = unknown[coefficients:].reshape(2, len(basis), d)
-        return table, Basis(np.exp(log_alpha), shift / basis.alpha)
-
-    def objective(unknown: Float1D) -> tuple[float, Float1D]:
-        table, moved = apart(unknown)
-        value, by_table, by_log_alpha, by_beta = _gradient(problem, table, moved)
-        slope = np.concatenate(
-            [(by_table * scale).ravel(), by_log_alpha.ravel(), (by_beta / basis.alpha).ravel()]
-        )
-        return value / size**2, slope / size**2
-
-    used, beta = basis.used, basis.beta
-    ceiling = np.maximum(problem.finest(basis), basis.alpha)
-    free = np.full(coefficients, np.inf)
-    low = [
-        -free,
-        np.log(np.where(used, LEAST_DILATION, basis.alpha)).ravel(),
-        (basis.alpha * np.where(used, -LARGEST_OVERHANG, beta)).ravel(),
-    ]
-    high = [
-        free,
-        np.log(np.where(used, ceiling, basis.alpha)).ravel(),
-        (basis.alpha * np.where(used, 1.0 + LARGEST_OVERHANG, beta)).ravel(),
-    ]
-    begin = [
-        (start.coefficients / scale).ravel(),
-        np.log(basis.alpha).ravel(),
-        (basis.alpha * basis.beta).ravel(),
-    ]
-    found = scipy.optimize.minimize(
-        objective,
-        np.concatenate(begin),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=scipy.optimize.Bounds(np.concatenate(low), np.concatenate(high)),
-        options={
-            "maxiter": QUASI_NEWTON_STEPS * steps,
-            "ftol": tolerance / problem.samples / QUASI_NEWTON_STEPS,
-        },
-    )
-    _, moved = apart(found.x)
-    moved = Basis(np.where(used, moved.alpha, basis.alpha), np.where(used, moved.beta, beta))
-    resolved = np.maximum(problem.finest(moved), LEAST_DILATION)
-    best = problem.solve(Basis(np.minimum(moved.alpha, resolved), moved.beta))
-    return best if best.objective < start.objective else start
-
-
-def _gradient(
-    problem: SeparableProblem, table: Float2D, basis: Basis
-) -> tuple[float, Float2D, Float2D, Float2D]:
-    """Returns the penalised squared error and its derivatives by coefficients (channels, 1 + d + N),
-    log(alpha) and beta (N, d)."""
-    first = 1 + problem.dimension
-    by_table = np.zeros_like(table)
-    by_log_alpha, by_beta = np.zeros_like(basis.alpha), np.zeros_like(basis.beta)
-    weights = table[:, first:]
-    value = problem.prior * float((weights**2).sum())
-    by_table[:, first:] = 2.0 * problem.prior * weights
-    row = 0
-    for block in problem.blocks:
-        own = slice(row, row + block.n_channels)
-        row += block.n_channels
-        columns, by_alpha, by_centre = wavelet_jacobian(block.positions, basis.alpha, basis.beta)
-        design = block.design(columns)
-        rest = block.target - design @ table[own].ravel()
-        value += float(rest @ rest)
-        by_table[own] -= 2.0 * (design.T @ rest).reshape(block.n_channels, -1)
-        pull = -2.0 * rest[:, None] * (block.channels @ weights[own])
-        for k in range(problem.dimension):
-            by_log_alpha[:, k] += np.einsum("mn,mn->n", pull, by_alpha[k]) * basis.alpha[:, k]
-            by_beta[:, k] += np.einsum("mn,mn->n", pull, by_centre[k])
-    return value, by_table, by_log_alpha, by_beta

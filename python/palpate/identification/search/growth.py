@@ -24,11 +24,10 @@ from ..network.separable import (
     SeparableProblem,
     Solution,
     refine,
-    refine_all,
 )
 from ..options import IdentifyOptions
 from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
-from .selection import Library, orthogonal_gains, residual_gains, select_backward, select_orders
+from .selection import Library, orthogonal_gains, select_orders
 
 MOST_PRUNE_TRIALS = 3
 """Largest number of wavelets tried for removal in succession. Wavelets whose removal raises the error least
@@ -134,10 +133,7 @@ class Growth:
 
     def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
         self._search, self._criterion, self._most = options.search, options.criterion, options.max_wavelets
-        self._single = single
-        paper = options.search.refinement == "quasi-newton" or options.search.selection == "backward"
-        self._harmonics = options.period is not None and not paper
-        self._refine = refine_all if options.search.refinement == "quasi-newton" else refine
+        self._single, self._periodic = single, options.period is not None
 
     def grow(
         self,
@@ -154,7 +150,7 @@ class Growth:
         long as these have fewer parameters. The criterion decides.
         """
         most, criterion = self._most if most is None else most, self._criterion
-        if not self._harmonics:
+        if not self._periodic:
             return self._grown_finer(problem, start, model_class, most, library)
         problem = problem.with_prior(problem.solve(start).rss)
         few = min(most, MOST_WITH_HARMONICS)
@@ -185,20 +181,14 @@ class Growth:
         positions and no correlation between neighbouring positions. Narrower wavelets are accepted if they
         reduce the error by a large factor, or if neighbouring residuals are correlated and the criterion
         decreases as much as for a new model class. Narrower wavelets are tried only for a single-valued
-        force, with refinement, without backward selection, and without a criterion on held-out rows. They are
-        not tried if noise is correlated, if the error is near the resolution of the force, or if wide
-        wavelets fit a force over several inputs.
+        force and without a criterion on held-out rows. They are not tried if noise is correlated, if the
+        error is near the resolution of the force, or if wide wavelets fit a force over several inputs.
         """
-        search = self._search
-        coarse = not search.refine or search.selection == "backward"
-        free = self._single and not coarse and problem.n_channels == 1
-        free = free and self._criterion not in ON_HELD_OUT_ROWS
+        free = self._single and problem.n_channels == 1 and self._criterion not in ON_HELD_OUT_ROWS
         several = problem.dimension > 1
         wide = free and several
-        problem = replace(problem, every_input=problem.dimension < LEAST_PARTIAL_INPUTS or coarse)
-        found = self._grown(
-            problem, start, model_class, most, library=library, wide=wide, in_parts=several and not coarse
-        )
+        problem = replace(problem, every_input=problem.dimension < LEAST_PARTIAL_INPUTS)
+        found = self._grown(problem, start, model_class, most, library=library, wide=wide, in_parts=several)
         problem = found.problem
         settled = wide and _below_resolution(problem, problem.rmse(found.solution))
         if not free or settled or len(found.solution.basis) == 0:
@@ -212,7 +202,7 @@ class Growth:
             return found
         fine = replace(problem, resolved_by=LEAST_CORE_POSITIONS)
         finer = self._grown(fine, found.solution.basis, model_class, most)
-        accepted = correlated and finer.criterion + search.evidence < found.criterion
+        accepted = correlated and finer.criterion + self._search.evidence < found.criterion
         if accepted or problem.rmse(finer.solution) * FINER_ERROR_RATIO < problem.rmse(found.solution):
             return replace(finer, path=(*found.path[:-1], finer.path[-1]))
         return replace(found, problem=problem.with_prior(found.solution.rss))
@@ -302,15 +292,12 @@ class Growth:
         compared = problem if problem.dimension == 1 else problem.part(MOST_LIBRARY_ROWS)
         library = library or self.library(compared)
         problem = problem.with_prior(problem.solve(start).rss)
-        if search.selection == "backward":
-            selected = select_backward(problem, library, max_wavelets=most, criterion=criterion)
-            start = start.joined(library.members(selected))
         problem, current = self._improved(problem, problem.solve(start), search.refine_steps)
         path, grown = [self._point(problem, current, model_class)], [current]
         best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
         while current.basis.size < most:
             report(model_class, current.basis.size)
-            if enough(criterion, path[-1].criterion) or search.selection == "backward":
+            if enough(criterion, path[-1].criterion):
                 stop_reason = criterion
                 break
             if wide and problem.rmse(current) <= np.sqrt(FORCE_RESOLUTION) * problem.force_range:
@@ -379,13 +366,12 @@ class Growth:
         one input are tried as well. A few different candidates are refined by some steps before one is taken,
         because the candidate that fits best before refinement often ends in a worse minimum.
         """
-        search = self._search
         if len(library) == 0 or problem.n_parameters(current.basis, more=1) >= problem.independent:
             return None
         whole = compared.blocks is problem.blocks
         compared = replace(compared, prior=problem.prior)
         start = current if whole else compared.solve(current.basis)
-        several = problem.dimension > 1 and search.refine
+        several = problem.dimension > 1
         gains = self._gains(compared, library, start)
         if several:
             library = library.stretched(compared, _falling(gains)[:MOST_STRETCHED])
@@ -396,8 +382,7 @@ class Growth:
             return None
         if len(tried) > 1:
             tried = [
-                self._refine(compared, each, steps=CANDIDATE_STEPS, tolerance=GROWING_TOLERANCE)
-                for each in tried
+                refine(compared, each, steps=CANDIDATE_STEPS, tolerance=GROWING_TOLERANCE) for each in tried
             ]
         best = min(tried, key=lambda solution: self._criterion_of(compared, solution))
         return best if whole else problem.solve(best.basis)
@@ -409,8 +394,7 @@ class Growth:
         Otherwise it is exp(-change of the criterion / n), because wavelets of more inputs have more
         parameters.
         """
-        measured = residual_gains if self._search.selection == "residual" else orthogonal_gains
-        gains = measured(library, current)
+        gains = orthogonal_gains(library, current)
         if problem.every_input or len(library) == 0:
             return gains
         penalty, n, p = CRITERIA[self._criterion], problem.independent, problem.n_parameters(current.basis)
@@ -446,8 +430,7 @@ class Growth:
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
     ) -> tuple[SeparableProblem, Solution]:
         """Refines the solution, then sets the weight penalty of the problem from the remaining error."""
-        if self._search.refine:
-            solution = self._refine(problem, solution, steps=steps, tolerance=tolerance)
+        solution = refine(problem, solution, steps=steps, tolerance=tolerance)
         if not problem.every_input:
             solution = self._without_idle_inputs(problem, solution)
         problem = problem.with_prior(solution.rss)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Selection of wavelets from a library of candidates: forward orthogonal, residual-based, backward
-elimination (Zhang 1997).
+"""Selection of wavelets and harmonics from a library of candidates (Zhang 1997).
 
 Forward orthogonal least squares (Chen, Billings & Luo 1989) measures the gain of a new candidate.
 
@@ -208,50 +207,6 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     return total
 
 
-def residual_gains(library: Library, current: Solution) -> Float1D:
-    """Returns the decrease of the residual sum of squares (candidates,) if a candidate were fitted to the
-    residual alone.
-
-    The projection of the candidate on the network is not removed first, which is faster but less exact.
-    """
-    total = np.zeros(len(library))
-    for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
-        along = _products(residual[None], columns)[:, 0]
-        inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=LEAST_NEW_SHARE, hermitian=True)
-        total += np.einsum("kn,nkj,jn->n", along, inverse, along)
-    return total
-
-
-def select_forward(
-    problem: SeparableProblem, library: Library, *, max_wavelets: int
-) -> tuple[list[int], list[float]]:
-    """Forward orthogonal selection: each step adds the wavelet that reduces the error most, up to
-    max_wavelets.
-
-    Returns
-    -------
-    order : list of int
-        The taken candidates of the library, in order.
-    totals : list of float
-        Sum of squared errors with 0, 1, 2 ... of them, including the scatter of samples within a row
-        [force^2].
-    """
-    start = problem.solve(Basis.empty(problem.dimension))
-    selection = OrthogonalSelection(library, start)
-    order: list[int] = []
-    totals = [problem.total(start.rss)]
-    while (
-        len(order) < max_wavelets
-        and problem.n_parameters(library.members(order), more=1) < problem.independent
-    ):
-        gains = selection.gains()
-        if len(gains) == 0 or gains.max() <= 0.0:
-            break
-        order.append(int(np.argmax(gains)))
-        totals.append(problem.total(selection.take(order[-1])))
-    return order, totals
-
-
 def select_orders(
     problem: SeparableProblem, start: Basis, *, max_wavelets: int, criterion: str, patience: int
 ) -> list[Solution]:
@@ -275,27 +230,6 @@ def select_orders(
         values.append(criterion_of(problem, found[-1], criterion))
     compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
     return found[: 1 + choice(criterion, values, compared)]
-
-
-def select_backward(
-    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
-) -> list[int]:
-    """Backward elimination: removes, from max_wavelets on, the wavelet whose removal raises the error least.
-    Returns the candidates of the network that the criterion prefers.
-
-    A library has more candidates than the data can distinguish, so a forward selection chooses the first
-    max_wavelets.
-    """
-    left, _ = select_forward(problem, library, max_wavelets=max_wavelets)
-    current = problem.solve(library.members(left))
-    networks, values = [list(left)], [criterion_of(problem, current, criterion)]
-    while left:
-        left.pop(int(np.argmin(problem.removal_costs(current))))
-        current = problem.solve(library.members(left))
-        networks.append(list(left))
-        values.append(criterion_of(problem, current, criterion))
-    compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
-    return networks[::-1][choice(criterion, values[::-1], compared)]
 
 
 def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:

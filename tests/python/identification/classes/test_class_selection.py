@@ -271,7 +271,6 @@ def test_a_bad_option_is_refused_by_name_and_value(options: dict[str, object], m
     [
         ({"frame_scale": 1.0}, "frame_scale is 1.0"),
         ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
-        ({"selection": "random"}, "selection is 'random': must be one of orthogonal"),
         ({"patience": 0}, "patience is 0: must be a whole number >= 1"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",

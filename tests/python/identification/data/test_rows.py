@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs by name, positions modulo a period, and the paper's filters."""
+"""Inputs by name and positions modulo a period."""
 
 import json
 from functools import cache
@@ -10,11 +10,9 @@ import pytest
 
 import palpate
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
-from palpate._core.dynamics import environment_filters
 from palpate.cli.main import main
 from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
-from palpate.identification.data.rows import Rows, modulo, paper_target, rows_of
-from palpate.recording import sample_force, sample_recording
+from palpate.identification.data.rows import Rows, modulo, rows_of
 
 
 def hunt_crossley(x: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -263,76 +261,6 @@ def test_measured_turns_are_identified_with_their_period(data: Path) -> None:
         model = identify(kept, period=6.283185307179586)
         assert model.period == 6.283185307179586, path.name
         assert verify(model, held).nrmse < 1.3 * verify(identify(kept), held).nrmse, path.name
-
-
-def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording:
-    """Returns a recording of a spring of 3 N*m/rad with mass and damping, moved sinusoidally."""
-    t = np.arange(0.0, 10.0, 1e-3)
-    x = 0.3 * np.sin(rate * t)
-    force = 3.0 * x - mass * rate**2 * x + damping * 0.3 * rate * np.cos(rate * t)
-    return Recording.from_arrays(x, force, time=t)
-
-
-@pytest.mark.parametrize(
-    ("filters", "mass", "damping"), [("paper-implicit", 0.02, 0.0), ("paper-explicit", 0.02, 0.5)]
-)
-def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, damping: float) -> None:
-    """G I is within 5 % of 1 well below 100 rad/s; the remaining m and B_o are small."""
-    recording = spring(4.0, mass=mass, damping=damping)
-    options = IdentifyOptions(search=SearchOptions(filters=filters, assumed_mass=0.02, assumed_damping=0.5))
-    target = paper_target(recording, options)[200:]
-    wrong = np.abs(target - 3.0 * recording.position[200:]).max()
-    assert wrong < 0.1 * np.abs(recording.force - 3.0 * recording.position).max() + 0.01
-
-
-def test_target_is_force_minus_filtered_motion() -> None:
-    recording = spring(20.0)
-    options = IdentifyOptions(
-        search=SearchOptions(filters="paper-explicit", assumed_mass=0.01, assumed_damping=0.2)
-    )
-    pair = environment_filters("explicit")
-    velocity = pair.g2.filter(recording.position)
-    expected = recording.force - 0.01 * pair.g1.filter(velocity) - 0.2 * velocity
-    np.testing.assert_allclose(paper_target(recording, options), expected, atol=1e-12)
-
-
-def test_the_model_holds_the_assumed_mass_and_damping() -> None:
-    recording = sample_recording(1, duration_s=5.0)
-
-    def filtered(filters: str) -> Model:
-        return identify(recording, inputs="position", max_wavelets=1, search=SearchOptions(filters=filters))
-
-    model = filtered("paper-explicit")
-    assert (model.mass, model.damping) == (1e-3, 0.5)
-    assert filtered("paper-implicit").damping is None
-
-
-@pytest.mark.full
-def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> None:
-    """Known truth: the lag of the paper causes an error, the matched route uses raw positions and forces."""
-    recording = sample_recording(1, duration_s=20.0)
-    x = np.linspace(-0.2, 0.469, 2001)
-    truth = sample_force(x)
-    errors = {
-        filters: float(
-            np.sqrt(
-                np.mean((identify(recording, search=SearchOptions(filters=filters)).force(x) - truth) ** 2)
-            )
-        )
-        for filters in ("matched", "paper-implicit", "paper-explicit")
-    }
-    assert errors["matched"] < 0.25 * errors["paper-implicit"] < 0.25 * errors["paper-explicit"]
-
-
-def test_other_periods_than_the_papers_are_refused() -> None:
-    x = np.linspace(0.0, 1.0, 100)
-    with pytest.raises(InputError, match=r"the recording has no time column, which the paper's filters need"):
-        identify(Recording.from_arrays(x, x), search=SearchOptions(filters="paper-implicit"))
-    with pytest.raises(InputError, match=r"are 0.01 to 0.01 s: the paper's filters need 0.001 s"):
-        identify(
-            Recording.from_arrays(x, x, time=0.01 * np.arange(100)),
-            search=SearchOptions(filters="paper-explicit"),
-        )
 
 
 def test_positions_modulo_the_period_are_below_one() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate import identify
-from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
+from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.data.compression import HeldOutRows, held_out_rows
 from palpate.identification.search.evidence import choice, enough, standard_error
 from palpate.recording import sample_recording
@@ -73,25 +73,3 @@ def test_decisions_report_the_criterion_of_each_model_class() -> None:
     reason = r"accepted \(lowers BIC by \d+\)"
     assert re.fullmatch(f"straight line: {reason}", straight)
     assert re.fullmatch(f"curve over position: {reason}", curve)
-
-
-@pytest.mark.parametrize("selection", ["orthogonal", "residual", "backward"])
-@pytest.mark.parametrize("refine", [True, False], ids=["refined", "frame-only"])
-def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
-    x, _, y = wall(3000, 1)
-    network = fit_environment(
-        x[:, None], y, None, IdentifyOptions(search=SearchOptions(selection=selection, refine=refine))
-    )
-    assert network.rmse == pytest.approx(0.02, rel=0.1)
-    assert len(network.weight) <= (12 if refine else 30)
-
-
-@pytest.mark.parametrize("criterion", ["fresh", "perceptual"])
-def test_backward_elimination_judges_the_size_on_held_out_rows(criterion: str) -> None:
-    x, _, y = wall(3000, 1)
-    options = IdentifyOptions(
-        criterion=criterion, max_wavelets=20, search=SearchOptions(selection="backward")
-    )
-    network = fit_environment(x[:, None], y, None, options)
-    assert 0 < len(network.weight) < 18
-    assert network.nrmse < (0.02 if criterion == "fresh" else 0.1)
