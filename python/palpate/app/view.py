@@ -218,7 +218,7 @@ class View:
         if isinstance(model, Refusal):
             return self._render("model", self._refused(model, entry), "", {}, [])
         compared = self.session.compared(entry)
-        notes = model.notes["identification"]
+        notes = [*model.notes["rows"], *model.notes["identification"]]
         if not isinstance(compared, Compared):
             reason = "" if compared is None else compared.sentence
             return self._render("model", self._judged(model.verdict, entry), reason, {}, notes)

@@ -328,7 +328,7 @@ def identify(
         _require_unit_of_period(unit, model.units["position"])
         chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
         talk(f"read {model.data.rows} rows; {chosen_columns}")
-        for note in model.notes["identification"]:
+        for note in (*model.notes["rows"], *model.notes["identification"]):
             talk(f"  {note}")
     seconds = time.perf_counter() - start
     verified = []
@@ -364,7 +364,7 @@ def identify(
     if hold_out_every is None:
         fitted = model.notes["error_rows"]
         judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
-    left_out_nrmse = model.notes.get("left_out_nrmse", 0.0)
+    left_out_nrmse, rows_left_out = model.notes["left_out_nrmse"], model.notes["rows"]
     left_out = ""
     if hold_out_every is None and left_out_nrmse > nrmse:
         left_out = f", {number(left_out_nrmse)} on rows left out of the fit"
@@ -385,7 +385,7 @@ def identify(
                     "model": f"{output}: {model.fit.model_class}, {model.terms}, "
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}{left_out}",
-                    **_left_out_text(model),
+                    **({"rows": " ".join(rows_left_out).removesuffix(".")} if rows_left_out else {}),
                     **_outside_text(model, recordings),
                     **_band_text(model, recordings),
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
@@ -399,7 +399,7 @@ def identify(
                 _print_sketch(model, recordings)
             if verbose:
                 reason = f"growth of the network stopped by {model.stop_reason}"
-                print_details([reason, *model.notes["identification"]])
+                print_details([reason, *rows_left_out, *model.notes["identification"]])
     end_with(verdict)
 
 
@@ -421,16 +421,6 @@ def _require_unit_of_period(unit: str, position_unit: str) -> None:
         raise click.UsageError(
             f"--period is in {unit} and the position in {position_unit}: both must be lengths or both angles"
         )
-
-
-_LEFT_OUT = ("rows are not fitted", "rows repeat the previous reading", "rows are wrong readings")
-"""Parts of the notes of an identification that name rows that it left out."""
-
-
-def _left_out_text(model: Model) -> dict[str, str]:
-    """Returns the line of the summary on rows that were left out; empty without such rows."""
-    notes = [note for note in model.notes["identification"] if any(part in note for part in _LEFT_OUT)]
-    return {"rows": " ".join(notes).removesuffix(".")} if notes else {}
 
 
 def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:

@@ -30,7 +30,7 @@ from .data.limits import ForceScale
 from .data.period import period_of, revolution_of
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
-from .decision import latest
+from .log import Log, latest
 from .network.fitted import FittedNetwork
 from .network.separable import TINY
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
@@ -75,8 +75,9 @@ def identify(
     Model
         ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
         every network that was considered. ``model.notes["model_selection"]`` holds one line for each model
-        class, accepted or not; ``model.notes["identification"]`` sentences on unused rows, constraints and
-        the check of the band; ``model.notes["roles"]`` the number of rows of each role. ``model.band`` is the
+        class, accepted or not; ``model.notes["rows"]`` sentences on rows that are not fitted, and
+        ``model.notes["roles"]`` the number of rows of each role; ``model.notes["identification"]`` sentences
+        on constraints and the check of the band. ``model.band`` is the
         range of force of a further recording.
 
     Raises
@@ -106,8 +107,8 @@ def identify(
         Reads files larger than memory part by part, in several processes or by the workers of a Dask
         scheduler.
     ``--json``, ``--quiet``, ``--verbose``, ``--sketch`` : the returned model
-        The error is ``model.fit.nrmse``, the notes are ``model.notes["identification"]``, and a notebook
-        shows the model as a table with its force curve.
+        The error is ``model.fit.nrmse``, the notes are ``model.notes["rows"]`` and
+        ``model.notes["identification"]``, and a notebook shows the model as a table with its force curve.
 
     Examples
     --------
@@ -160,15 +161,16 @@ def identify(
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
-    network = replace(network, notes=(*informative.notes, *unused, *sections, *network.notes))
+    network = replace(network, log=Log(rows=[*informative.notes, *unused, *sections]) + network.log)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     known = rows.order if rows.side is None else rows.side
     verdict = verdict_of(network, recordings, known if every_row else None)
     model = model_of(network, recordings[0].units, source, settings, verdict)
-    if left_out := sum(map(len, recordings)) - len(rows.force):
-        informative.dropped["left out"] = left_out
-    model.notes["roles"] = role_counts(rows.roles) | informative.dropped
+    left_out = sum(map(len, recordings)) - len(rows.force)
+    model.notes["roles"] = (
+        role_counts(rows.roles) | informative.dropped | ({"left out": left_out} if left_out else {})
+    )
     if (steepest := SteepestSlope.of(model)) is not None:
         on_it = rows.fitted & steepest.rows(rows.domain[:, 0], known)
         model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))
@@ -204,7 +206,7 @@ def _fitted_with_period(
     if chosen.period is not None and searched:
         text = recordings[0].file_unit("position").text(chosen.period)
         note = f"The force repeats every {text}: positions are taken modulo this period (--period)."
-        network = replace(network, notes=(note, *network.notes))
+        network = replace(network, log=Log(notes=[note]) + network.log)
     return network, chosen, rows
 
 
@@ -334,18 +336,15 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     ):
         return identified(select(rows, options))
     left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not used to test hysteresis."
-    found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))
+    directed = replace(rows, log=rows.log + Log(rows=[left_out])).only(side != 0)
+    found = identified(select(directed, options))
     if found.weight_hysteresis is not None:
         return found
     # hysteresis was refused, so rows without a direction need not be left out
-    every_row = replace(rows, side=None, starts=None, parts=(), decisions=(), notes=())
+    every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
     again = identified(select(every_row, options))
-    return replace(
-        again,
-        path=found.path + again.path,
-        decisions=latest(found.decisions + again.decisions)[0],
-        notes=found.notes + again.notes,
-    )
+    log = found.log + again.log
+    return replace(again, log=replace(log, decisions=latest(log.decisions)[0], findings=again.log.findings))
 
 
 def _resting(rows: Rows, options: IdentifyOptions) -> IdentifyRest:
@@ -389,8 +388,9 @@ def model_of(
         band=network.band,
         data=source,
         notes={
-            "model_selection": [str(decision) for decision in network.decisions],
-            "identification": [*network.notes, *network.band_check],
+            "model_selection": [str(decision) for decision in network.log.decisions],
+            "rows": network.log.rows,
+            "identification": network.log.notes,
             "left_out_nrmse": network.left_out_nrmse,
             "error_rows": network.residuals,
             "verdict": verdict.record(),

@@ -39,13 +39,13 @@ from ..recording.files import unchanged
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
-from ..verdict import Finding, usable
+from ..verdict import usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.rows import modulo, require_in_range
 from .data.strokes import DIRECTION_CURE
-from .decision import Decision, in_words
 from .identify import fit_environment, model_of
+from .log import Decision, Log, in_words
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 from .threads import one_thread
@@ -129,7 +129,7 @@ def identify_files(
     if not paths:
         raise InputError("files is empty: give a path or a list of paths")
     with unchanged(*paths):
-        summary, recordings, notes = _read(
+        summary, recordings, log = _read(
             paths,
             partial(in_order, jobs=jobs, scheduler=scheduler),
             progress,
@@ -144,13 +144,13 @@ def identify_files(
             invalid=invalid,
             part_rows=part_rows,
         )
-    return _identified(summary, recordings, settings, notes)
+    return _identified(summary, recordings, settings, log)
 
 
 def _read(
     paths: Sequence[Path], in_workers: Callable[..., Iterator[PartRead]], progress: Progress, **reading: Any
-) -> tuple[Summary, list[LongRecording], list[str]]:
-    """Returns the summary of all rows of files, the opened files, and notes on their format and rows.
+) -> tuple[Summary, list[LongRecording], Log]:
+    """Returns the summary of all rows of files, the opened files, and a log of their format and rows.
 
     `reading` holds the arguments of :func:`open_long_recording`.
     """
@@ -170,18 +170,19 @@ def _read(
     for number, part in zip(numbers, read, strict=True):
         of_file[number].left_out.add(part.left_out, of_file[number].rows)
         of_file[number].add(part.summary, part.rows)
-    notes: list[str] = []
+    log = Log()
     for recording, found in zip(recordings, of_file, strict=True):
         require_all_rows(recording, found)
         # The first note repeats the columns of the source, and is used only if it states the format of the
         # file.
-        sentences = [note for note in recording.notes[:1] if "read as" in note]
-        sentences += [*recording.notes[1:], *found.left_out.sentences(recording.places())]
-        notes += [f"{recording.path}: {each}" for each in sentences] if len(recordings) > 1 else sentences
+        where = f"{recording.path}: " if len(recordings) > 1 else ""
+        form = [note for note in recording.notes[:1] if "read as" in note]
+        log.notes += [where + each for each in (*form, *recording.notes[1:])]
+        log.rows += [where + each for each in found.left_out.sentences(recording.places())]
     summaries = [found.summary for found in of_file if found.summary is not None]
     if not summaries:
         raise InputError(f"{', '.join(str(path) for path in paths)}: no row is usable")
-    return reduce(merged, summaries), recordings, notes
+    return reduce(merged, summaries), recordings, log
 
 
 @dataclass
@@ -257,24 +258,23 @@ def _error_on_rows(
 
 
 def _identified(
-    summary: Summary, recordings: Sequence[LongRecording], settings: IdentifyOptions, notes: list[str]
+    summary: Summary, recordings: Sequence[LongRecording], settings: IdentifyOptions, log: Log
 ) -> Model:
-    notes += mirror_notes(summary.correlation)
+    log.notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
-    notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
-    decisions: list[Decision] = []
+    log.notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
     if settings.inputs == "auto" and all(recording.has_time for recording in recordings):
-        decisions += [Decision(in_words(name), "not tested", IN_PARTS) for name in UNTESTED]
-    findings: list[Finding] = []
+        log.decisions += [Decision(in_words(name), "not tested", IN_PARTS) for name in UNTESTED]
     if all(recording.direction is None for recording in recordings):
         if settings.inputs != "auto" and "hysteresis" not in settings.inputs:
             side = None
         elif _known_strokes(summary):
-            notes.append("The direction is taken from the order of rows, block by block.")
+            log.notes.append("The direction is taken from the order of rows, block by block.")
         else:
             side = None
-            decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
-            findings.append(usable(f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"))
+            log.decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
+            untested = f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"
+            log.findings.append(usable(untested))
     with one_thread():
         network = fit_environment(
             summary.position[:, None],
@@ -294,9 +294,7 @@ def _identified(
         rmse=rmse,
         nrmse=nrmse,
         settled_nrmse=(nrmse, network.left_out_nrmse),
-        decisions=(*network.decisions, *decisions),
-        notes=(*notes, *network.notes),
-        findings=(*findings, *network.findings),
+        log=replace(log, decisions=[]) + network.log + Log(decisions=log.decisions),
     )
     if settings.period is None:
         network = replace(network, lower=np.array([summary.lower]), upper=np.array([summary.upper]))

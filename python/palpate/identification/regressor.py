@@ -21,6 +21,7 @@ from .classes.model_selection import select
 from .data.compression import held_out_rows
 from .data.limits import ForceScale, distinct_rows
 from .data.rows import LARGEST_MAGNITUDE, Rows
+from .log import Log
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions
 from .search.evidence import ON_HELD_OUT_ROWS, RowError
@@ -248,8 +249,8 @@ def fit_regression(
         some = slice(None, None, max(1, -(-len(y) // MOST_ERROR_ROWS)))
         error = RowError(y[some] - best.force_at(some), y[some], weight[some])
     margin = _margin(rows.box) * (upper - lower)
-    path = tuple(selection.report.path)
-    network = replace(best.network, rmse=error.rmse, path=path, lower=lower - margin, upper=upper + margin)
+    log = Log(selection.log.path)
+    network = replace(best.network, rmse=error.rmse, log=log, lower=lower - margin, upper=upper + margin)
     return columns, network
 
 

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..decision import in_words, shifted_strokes
+from ..log import Log, in_words, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import (
     Bound,
@@ -32,7 +32,7 @@ from ..network.constraints import (
 )
 from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate, Judge, Report, Samples, criterion_of
+from ..search.evidence import Candidate, Judge, Samples, criterion_of
 from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
 
@@ -74,18 +74,18 @@ class ClassSelection:
         previous: ClassSelection | None = None,
     ) -> None:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
-        self.report: Report = Report(list(previous.report.path) if previous else [])
+        self.log: Log = Log(list(previous.log.path) if previous else [])
         self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
         """Wavelets with which the growth of a network starts, by the name of the model class"""
         self.samples = Samples(data, options, cells)
-        self.judge = Judge(self.samples, options, self.report)
+        self.judge = Judge(self.samples, options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
         self._fixed_force = self._fixed_in_box()
         self.spread = float(np.std(data.force[data.reported])) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
         if self.samples.used < given:
-            self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
+            self.log.rows.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
         self.best = constant(self)
         """Candidate of the most complex model class that has been accepted"""
         self.try_classes(classes)
@@ -143,12 +143,12 @@ class ClassSelection:
     ) -> Grown:
         """Grows a network from the wavelets of `start` and reports the tested networks."""
         grown = self.growth.grow(problem, start, model_class, most=most)
-        self.report.path.extend(grown.path)
+        self.log.path.extend(grown.path)
         return grown
 
     def recorded(self, candidate: Candidate) -> Candidate:
         """Adds a candidate to the list of tested networks and returns it."""
-        self.report.path.append(candidate.point(self.options.criterion))
+        self.log.path.append(candidate.point(self.options.criterion))
         return candidate
 
     def constrained(self, candidate: Candidate) -> Candidate:
@@ -176,7 +176,7 @@ class ClassSelection:
             trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
             if self._judged_on(regrown.problem, trial) < self._judged_on(regrown.problem, kept):
                 kept = trial
-        self.report.notes.append(self._cost_of(bounds, candidate, problem.rmse(kept)))
+        self.log.notes.append(self._cost_of(bounds, candidate, problem.rmse(kept)))
         more = problem.n_parameters(kept.basis) - problem.n_parameters(candidate.solution.basis)
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
 

@@ -18,7 +18,7 @@ from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION, LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
-from ..decision import Decision, decided, lowered, squared_error_change
+from ..log import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions

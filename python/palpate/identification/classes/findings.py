@@ -18,7 +18,7 @@ from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
-from ..decision import latest, shifted_strokes
+from ..log import Log, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..network.separable import TINY
@@ -54,13 +54,13 @@ def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    findings = [*findings_of(recordings, side), *network.findings]
+    findings = [*findings_of(recordings, side), *network.log.findings]
     fitted, left_out = network.settled_nrmse
     rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""
-    if not network.findings and fitted <= USABLE_NRMSE:
+    if not network.log.findings and fitted <= USABLE_NRMSE:
         cure = ". The rows are too far apart to show the force between them: record more rows per stroke"
-    elif not network.findings:
+    elif not network.log.findings:
         timed = all(each.time is not None for each in recordings)
         directed = all(each.direction is not None for each in recordings)
         more = _more_inputs(timed, directed)
@@ -307,11 +307,11 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
 def identified(selection: ClassSelection) -> FittedNetwork:
     """Returns the accepted network in the units of the recording, with its error on the rows, all notes and
     findings."""
-    best, report, options = selection.best, selection.report, selection.options
+    best, log, options = selection.best, selection.log, selection.options
     data, error, network = best.data, best.error, best.network
     single, counted = len(data.names) == 1, error.weight
-    notes, findings = list(data.notes), list(data.findings)
-    decisions, replaced = latest([*report.decisions, *data.decisions])
+    notes, findings = list(data.log.notes), list(data.log.findings)
+    decisions, replaced = latest([*log.decisions, *data.log.decisions])
     if data.period is not None:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
@@ -319,7 +319,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings += wait_findings(best)
     # One cause of an error hides the others.
     findings += (
-        report.findings
+        log.findings
         or energy_findings(best)
         or limit_findings(best, options)
         or drift_findings(best)
@@ -354,10 +354,12 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         left_out_nrmse=replace(error, residual=left_out).nrmse,
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
-        path=tuple(report.path),
-        decisions=decisions,
-        notes=(*notes, *report.notes, *(f"Replaced decision: {each}." for each in replaced)),
-        findings=tuple(findings),
         band=band,
-        band_check=checked,
+        log=Log(
+            log.path,
+            decisions,
+            data.log.rows + log.rows,
+            [*notes, *log.notes, *(f"Replaced decision: {each}." for each in replaced), *checked],
+            findings,
+        ),
     )

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
 from ..data.strokes import FAR, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
-from ..decision import Decision, shifted_strokes
+from ..log import Decision, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
@@ -99,7 +99,7 @@ class Hysteresis(ModelClass):
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
-        selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
+        selection.log.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
     def _fits_better(self, one: Candidate, other: Candidate) -> bool:
@@ -157,7 +157,7 @@ class Hysteresis(ModelClass):
         single = self._single_valued(kept) if kept is not free and below.n_wavelets else below
         best = judge.better(single, kept)
         if best is single and best.n_wavelets < below.n_wavelets:
-            self._selection.report.notes.append(
+            self._selection.log.notes.append(
                 f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed "
                 "wavelets modelled the difference between press and release."
             )
@@ -258,7 +258,7 @@ class Hysteresis(ModelClass):
                 "object may release stored energy, as a latch does: give --no-hysteresis-nonnegative"
             )
         sentence = f"hysteresis gains energy: {where} ({cost}); {cure}"
-        self._selection.report.findings[:] = [usable(sentence)]
+        self._selection.log.findings[:] = [usable(sentence)]
 
     def _turned_rmse(self, free: Candidate) -> float:
         """Returns the RMS error with the constraint h <= 0, which is h >= 0 for the opposite sign of the

@@ -20,7 +20,7 @@ from ...recording import Recording
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
-from ..decision import Decision, decided, lowered, squared_error_change
+from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, deviance
@@ -312,7 +312,7 @@ def better_with_memory(
     reason = untested(found, recordings, fitted_rows, options)
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
-        return replace(found, decisions=(*found.decisions, decision)) if reason else found
+        return replace(found, log=found.log + Log(decisions=[decision])) if reason else found
     recorded = Recorded.of(recordings, found)
     choice = grown(recorded, options)
     if choice.shape is None:
@@ -395,10 +395,13 @@ def better_with_memory(
         settled_nrmse=(settled_nrmse, left_out_nrmse),
         left_out_nrmse=left_out_nrmse,
         residuals=fit.n_rows,
-        findings=tuple(findings),
-        path=found.path + network.path,
-        decisions=(*found.decisions, decision),
-        notes=(*found.notes, *_branches(recorded, refined)),
+        log=Log(
+            found.log.path + network.log.path,
+            [*found.log.decisions, decision],
+            found.log.rows,
+            [*found.log.notes, *_branches(recorded, refined)],
+            findings,
+        ),
     )
 
 
@@ -431,7 +434,7 @@ def _pulls(recording: Recording, recorded: Recorded, linear: float, free: float)
 
 def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iterator[Finding]:
     """Yields a finding if neither pauses nor different speeds show whether the force depends on time."""
-    for decision in found.decisions:
+    for decision in found.log.decisions:
         constant = decision.model_class == "damping" and decision.outcome == "not tested"
         if constant and not any((roles_of(part) == Role.HOLD).any() for part in recordings):
             yield usable(
@@ -442,7 +445,7 @@ def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iter
 
 
 def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
-    return replace(found, decisions=(*found.decisions, decided("memory", False, reason)))
+    return replace(found, log=found.log + Log(decisions=[decided("memory", False, reason)]))
 
 
 def _gain_text(gain: float, error: float) -> str:

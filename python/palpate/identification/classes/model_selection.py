@@ -15,7 +15,7 @@ from ..data.limits import (
     innovation_deviance,
 )
 from ..data.rows import Rows
-from ..decision import decided, in_words, lowered
+from ..log import decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
@@ -76,7 +76,7 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
             break
         repeated = current.repeated(replace(current.data, limits=replace(limits, independent=share)))
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
-        repeated.report.replaces(current.report, note)
+        repeated.log.replaces(current.log, note)
         current = repeated
     chosen = min(found, key=lambda each: each[0])[1]
     full = first.best.stop_reason == "max_wavelets"
@@ -99,7 +99,7 @@ class MassAndDamping(ModelClass):
         selection, motion, data = self._selection, self._selection.motion, self._selection.data
         assert motion is not None
         values, decisions = motion.accepted(below.solution.basis, below.strokes)
-        selection.report.decisions.extend(decisions)
+        selection.log.decisions.extend(decisions)
         best, current, names = below, selection, tuple(values)
         for _ in range(MOST_DYNAMIC_SELECTIONS):
             if not values or min(values.values()) <= 0.0:
@@ -119,7 +119,12 @@ class MassAndDamping(ModelClass):
         if best is below:
             return below
         note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."
-        selection.report.add(current.report, note)
+        log, later = selection.log, current.log
+        log.path += later.path
+        log.decisions += later.decisions
+        log.rows += later.rows
+        log.notes += [note, *later.notes]
+        log.findings = later.findings
         return selection.recorded(best)
 
 
@@ -135,9 +140,9 @@ class Velocity(ModelClass):
     def better(self, below: Candidate) -> Candidate:
         """Returns the network over position and velocity if the squared error decreases enough, else the
         simpler candidate."""
-        data, report, motion, moving = (
+        data, log, motion, moving = (
             self._selection.data,
-            self._selection.report,
+            self._selection.log,
             self._selection.motion,
             below.moving,
         )
@@ -156,9 +161,7 @@ class Velocity(ModelClass):
             data.force[rows],
             starts=(0,),
             weight=None if data.weight is None else data.weight[rows],
-            decisions=data.decisions,
-            notes=data.notes,
-            findings=data.findings,
+            log=data.log,
             repeats=None if data.repeats is None else data.repeats.only(rows),
             position_unit=data.position_unit,
             force_unit=data.force_unit,
@@ -171,13 +174,14 @@ class Velocity(ModelClass):
         compared = "constant damping" if constant else in_words(below.model_class)
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
         bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
-        report.path += both.report.path
-        report.decisions.append(decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}"))
+        log.path += both.log.path
+        log.decisions.append(decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}"))
         if share < LEAST_GAIN:
             return below
-        over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
-        report.notes += [*over_both_inputs, *both.report.notes]
-        report.findings += both.report.findings
+        over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.log.decisions]
+        log.rows += both.log.rows
+        log.notes += [*over_both_inputs, *both.log.notes]
+        log.findings += both.log.findings
         return both.best
 
 

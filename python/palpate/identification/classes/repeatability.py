@@ -68,10 +68,10 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
         return first
     smaller.options = options
     smaller.best = replace(smaller.best, stop_reason=STOPPED_BY_REPEATS)
-    tested = {decision.model_class for decision in smaller.report.decisions}
-    smaller.report.decisions += [each for each in first.report.decisions if each.model_class not in tested]
-    smaller.report.replaces(
-        first.report,
+    tested = {decision.model_class for decision in smaller.log.decisions}
+    smaller.log.decisions += [each for each in first.log.decisions if each.model_class not in tested]
+    smaller.log.replaces(
+        first.log,
         f"The recordings differ from their mean by {data.force_unit.text(apart)} RMS, so that "
         f"{best.n_wavelets - smaller.best.n_wavelets} of {best.n_wavelets} wavelets were not needed.",
     )

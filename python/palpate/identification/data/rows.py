@@ -5,7 +5,7 @@ one repeat length."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from ...recording.motion import Piece, ordered_strokes, pieces, velocity
 from ...recording.roles import Role, roles_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
-from ..decision import Decision
+from ..log import Log
 from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
@@ -74,11 +74,8 @@ class Rows:
     [force^2]"""
     period: float | None = None
     """Repeat length of a periodic force law [position]; None if the force law is not periodic"""
-    decisions: tuple[Decision, ...] = ()
-    """Decisions on model classes that were made before the model selection"""
-    notes: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    """Findings that can lower the verdict"""
+    log: Log = field(default_factory=Log)
+    """Decisions, sentences and findings from before the model selection"""
     counted: Float1D | None = None
     """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
     limits: RowLimits = NO_LIMITS
@@ -192,10 +189,10 @@ class Rows:
             return replace(self, counted=self.weight, limits=RowLimits(position_gap=gap))
         limits = RowLimits(force_error=STEP_ERROR * force_step(self.force[self.fitted]), position_gap=gap)
         again, repeats = repeated(self.positions, self.force, self.side)
-        notes = (*self.notes, repeats) if repeats else self.notes
+        log = self.log + Log(rows=[repeats] if repeats else [])
         unused = again | ~self.fitted
         weight = np.where(unused, 0.0, 1.0) if unused.any() else None
-        return replace(self, limits=limits, weight=weight, notes=notes)
+        return replace(self, limits=limits, weight=weight, log=log)
 
     def _usual_gap(self) -> float:
         """Returns the gap [box] that is not exceeded between neighbouring positions on `COVERED_SHARE` of the
@@ -282,16 +279,13 @@ def rows_of(
     kept = [rows for _, rows in found]
     columns = [X[rows] for X, rows in found]
     lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
-    notes: tuple[str, ...] = (
-        (f"{lost} rows at the ends and at gaps of time have no velocity and are not used.",) if lost else ()
-    )
+    no_velocity = f"{lost} rows at the ends and at gaps of time have no velocity and are not used."
     hysteresis = len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs)
     strokes = strokes_of(recordings) if hysteresis else stated_strokes(recordings)
     side, order = (
         None if each is None else each[np.concatenate(kept)] for each in (strokes.side, strokes.order)
     )
     starts = _starts(recordings, kept) if strokes.in_order else None
-    notes += strokes.notes
     parts: tuple[Piece, ...] = ()
     if len(names) == 1 and all(part.time is not None for part in recordings):
         first = np.cumsum([0, *(len(part) for part in recordings)])
@@ -323,9 +317,7 @@ def rows_of(
         starts,
         parts,
         period=options.period,
-        decisions=strokes.decisions,
-        notes=notes,
-        findings=strokes.findings,
+        log=Log(rows=[no_velocity] if lost else []) + strokes.log,
         corners=corners,
         role=role,
         repeats=repeats,

@@ -5,7 +5,7 @@ force."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -15,8 +15,8 @@ from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
 from ...recording.motion import ordered_strokes, states_its_order, turns_of
-from ...verdict import Finding, usable
-from ..decision import Decision
+from ...verdict import usable
+from ..log import Decision, Log
 
 TRAVEL_CELLS = 32
 """Number of cells of the travel in which press force and release force are compared."""
@@ -50,9 +50,7 @@ class Strokes:
     """(n,) the same of rows in the order of a motion; None if `side` is known or if there are no strokes"""
     in_order: bool = False
     """True if a play operator can follow the rows, which are in the order of a motion"""
-    notes: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    decisions: tuple[Decision, ...] = ()
+    log: Log = field(default_factory=Log)
 
 
 def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
@@ -95,8 +93,8 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
         note += f" in {len(recordings)} recordings, " + _ways(recordings, known)
     if (side > 0).any() and (side < 0).any():
         if _all_of(ordered) is None:  # the rows with a stated direction are in another order
-            return Strokes(side, notes=(f"{note}.",))
-        return Strokes(order=side, in_order=True, notes=(f"{note}.",))
+            return Strokes(side, log=Log(notes=[f"{note}."]))
+        return Strokes(order=side, in_order=True, log=Log(notes=[f"{note}."]))
     press = _press(recordings)
     if press is None:
         return _untested("the position never turns back in the order of rows")
@@ -112,7 +110,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
         "positions change in the same direction. If these are two objects, identify each one "
         f"separately. If they repeat one stroke, give --inputs position. Else {DIRECTION_CURE}"
     )
-    return Strokes(side, notes=(f"{note}.",), findings=(finding,))
+    return Strokes(side, log=Log(notes=[f"{note}."], findings=[finding]))
 
 
 def _all_of(directions: Sequence[Int8Vector | None]) -> Float1D | None:
@@ -192,7 +190,7 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
 
 def _untested(why: str) -> Strokes:
     """Returns no directions, and the decision that hysteresis is not tested."""
-    return Strokes(decisions=(Decision("hysteresis", "not tested", why),))
+    return Strokes(log=Log(decisions=[Decision("hysteresis", "not tested", why)]))
 
 
 def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:

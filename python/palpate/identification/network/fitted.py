@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,21 +14,9 @@ from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
 from ...model.band import Band
 from ...recording.units import UNSTATED_UNIT, Unit
-from ...verdict import Finding
 from ..data.limits import ForceScale
-from ..decision import Decision
+from ..log import Log
 from .separable import Solution
-
-
-@dataclass(frozen=True)
-class PathPoint:
-    """Network that the model selection tested: its RMS error [force], and its criterion (a smaller value is
-    better)."""
-
-    model_class: str
-    n_wavelets: int
-    rmse: float
-    criterion: float
 
 
 @dataclass(frozen=True)
@@ -123,21 +111,13 @@ class FittedNetwork:
     """Number of rows with a residual"""
     residual_correlation: float = 0.0
     """Correlation of the residuals of neighbouring rows in recorded order [-]"""
-    path: tuple[PathPoint, ...] = ()
-    """Networks that the model selection tested, in order"""
-    decisions: tuple[Decision, ...] = ()
-    """Last decision of the model selection on each model class: accepted or not, with the reason"""
-    notes: tuple[str, ...] = ()
-    """Sentences on unused rows, on the rise of the error by constraints, and on replaced decisions"""
     independent_rows: float = np.inf
     """Number of independent rows; below the number of rows if rows are repeated or their noise is
     correlated"""
-    findings: tuple[Finding, ...] = ()
-    """Findings that can lower the verdict"""
     band: Band | None = None
     """Band of a further recording; None for one recording"""
-    band_check: tuple[str, ...] = ()
-    """Sentence on the check of the band, or on a missing band; empty for one recording"""
+    log: Log = field(default_factory=Log)
+    """Tested networks, decisions, sentences and findings"""
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""
@@ -169,7 +149,7 @@ class FittedNetwork:
                 "criterion": at.criterion if math.isfinite(at.criterion) else None,
                 "model_class": at.model_class,
             }
-            for at in self.path
+            for at in self.log.path
         ]
         return Fit(
             model_class=self.model_class,
@@ -184,13 +164,14 @@ class FittedNetwork:
         """Returns the network in the unit of the recorded force, without the offset and factor of the fit."""
 
         factor = scale.factor
-        notes = self.notes
+        log = replace(self.log, path=[replace(point, rmse=point.rmse / factor) for point in self.log.path])
         if factor != 1.0:
             multiplied = f"For the fit, and in these notes, the recorded forces are multiplied by {factor:g}."
-            notes = (multiplied, *notes)
+            log = Log(notes=[multiplied]) + log
         if scale.offset:
             offset = force_unit.text(scale.offset)
-            notes = (f"An offset of {offset} was subtracted from the recorded force for the fit.", *notes)
+            text = f"An offset of {offset} was subtracted from the recorded force for the fit."
+            log = Log(notes=[text]) + log
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
@@ -200,8 +181,7 @@ class FittedNetwork:
             self,
             below="linear" if scale.offset else self.below,
             bias=self.bias / factor + scale.offset,
-            path=tuple(replace(point, rmse=point.rmse / factor) for point in self.path),
-            notes=notes,
+            log=log,
             band=None if self.band is None else self.band.scaled(1.0 / factor),
             **values,
         )

@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
-from ...verdict import Finding
 from ..data.compression import (
     Compressed,
     Compressor,
@@ -36,8 +35,8 @@ from ..data.compression import (
 )
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..decision import Decision, decided, in_words, lowered
-from ..network.fitted import FittedNetwork, PathPoint
+from ..log import Log, PathPoint, decided, in_words, lowered
+from ..network.fitted import FittedNetwork
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
@@ -338,33 +337,6 @@ class Candidate:
         return RowError(self.residual, self.data.force, weight, self.data.within)
 
 
-@dataclass
-class Report:
-    """Tested networks, decisions, notes and findings of a model selection."""
-
-    path: list[PathPoint] = field(default_factory=list)
-    decisions: list[Decision] = field(default_factory=list)
-    """Decisions on the model classes, in order"""
-    notes: list[str] = field(default_factory=list)
-    """Sentences on imposed constraints, with the rise of the error by them, and on unused rows"""
-    findings: list[Finding] = field(default_factory=list)
-    """Findings on a release force above the press force"""
-
-    def replaces(self, other: Report, note: str) -> None:
-        """Puts the tested networks of the replaced model selection `other`, and the reason for its
-        replacement, in front of the tested networks and notes of this model selection."""
-        self.path[:0] = other.path
-        self.notes.insert(0, note)
-
-    def add(self, other: Report, note: str) -> None:
-        """Adds the tested networks, decisions and notes of a later model selection, and takes over its
-        findings."""
-        self.path += other.path
-        self.decisions += other.decisions
-        self.notes += [note, *other.notes]
-        self.findings = other.findings
-
-
 class Samples:
     """Rows of one recording: compressed rows for the fit, and held-out rows for the comparison of models.
 
@@ -457,19 +429,19 @@ class Judge:
     ----------
     samples : Samples
     options : IdentifyOptions
-    report : Report
+    log : Log
         Receives the decisions of `better`.
     """
 
-    def __init__(self, samples: Samples, options: IdentifyOptions, report: Report) -> None:
+    def __init__(self, samples: Samples, options: IdentifyOptions, log: Log) -> None:
         self.criterion, self.evidence = options.criterion, options.search.evidence
-        self._samples, self._report = samples, report
+        self._samples, self._log = samples, log
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
         """Returns the more complex candidate if it is accepted, else the simpler candidate; adds the decision
-        to the report."""
+        to the log."""
         judged = self.compared(below, above)
-        self._report.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
+        self._log.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
         return above if judged.accepted else below
 
     def accepts(self, below: Candidate, above: Candidate) -> bool:

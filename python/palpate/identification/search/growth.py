@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..._core.model import most_wavelets
 from ..._typing import Float1D
 from ...recording.motion import FORCE_RESOLUTION
+from ..log import PathPoint
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
-from ..network.fitted import PathPoint
 from ..network.separable import (
     LEAST_DILATION,
     SIGNIFICANT_CORRELATION,

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decisions of the model selection: one short line for each model class."""
+"""What an identification reports besides the force law: tested networks, decisions, sentences, findings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from ..verdict import Finding
 
 _WORDS = {
     "constant": "constant force",
@@ -33,6 +35,42 @@ class Decision:
         return f"{self.model_class}: {self.outcome} ({self.reason})"
 
 
+@dataclass(frozen=True)
+class PathPoint:
+    """Network that the model selection tested: its RMS error [force], and its criterion (a smaller value is
+    better)."""
+
+    model_class: str
+    n_wavelets: int
+    rmse: float
+    criterion: float
+
+
+@dataclass
+class Log:
+    """What an identification reports, in order. The logs of two stages are added."""
+
+    path: list[PathPoint] = field(default_factory=list)
+    """Networks that the model selection tested"""
+    decisions: list[Decision] = field(default_factory=list)
+    """Decisions on model classes, each with its reason"""
+    rows: list[str] = field(default_factory=list)
+    """Sentences on rows that are not fitted"""
+    notes: list[str] = field(default_factory=list)
+    """All other sentences, such as the rise of the error by constraints"""
+    findings: list[Finding] = field(default_factory=list)
+    """Findings that can lower the verdict"""
+
+    def __add__(self, other: Log) -> Log:
+        return Log(*(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True)))
+
+    def replaces(self, other: Log, note: str) -> None:
+        """Puts the tested networks of a replaced model selection, and the reason for its replacement, in
+        front."""
+        self.path[:0] = other.path
+        self.notes.insert(0, note)
+
+
 def in_words(model_class: str) -> str:
     """Returns the name of a model class for messages."""
     return _WORDS.get(model_class, model_class)
@@ -43,7 +81,7 @@ def decided(model_class: str, accepted: bool, reason: str) -> Decision:
     return Decision(in_words(model_class), "accepted" if accepted else "not accepted", reason)
 
 
-def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[Decision, ...]]:
+def latest(decisions: Iterable[Decision]) -> tuple[list[Decision], list[Decision]]:
     """Returns the last decision on each model class, in order of first decisions, and the replaced earlier
     decisions."""
     last: dict[str, Decision] = {}
@@ -52,7 +90,7 @@ def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[D
         if decision.model_class in last:
             replaced.append(last[decision.model_class])
         last[decision.model_class] = decision
-    return tuple(last.values()), tuple(replaced)
+    return list(last.values()), replaced
 
 
 def lowered(quantity: str, decrease: float) -> str:
