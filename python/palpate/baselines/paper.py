@@ -21,7 +21,6 @@ from ..identification.network.basis import Basis
 from ..identification.network.separable import (
     LARGEST_OVERHANG,
     LEAST_DILATION,
-    TINY,
     SeparableProblem,
     Solution,
     problem_of,
@@ -94,10 +93,10 @@ class PaperNetwork:
             rows = Compressor(self._box(X), y, max_positions=cells).rows()
             problem = problem_of(rows, resolved_by=options.search.resolved_by)
             library = Growth(options).library(problem)
-            # fewer parameters than rows
-            line = problem.n_parameters(Basis.empty(d))
-            spare = (len(y) - 1 - line) // (problem.n_parameters(Basis.empty(d), more=1) - line)
-            order = SELECTIONS[self.selection](problem, library, max(0, min(self.max_wavelets, spare)))
+            line, more = (problem.n_parameters(Basis.empty(d), more) for more in (0, 1))
+            fewer_than_rows = (len(y) - 1 - line) // (more - line)
+            most = max(0, min(self.max_wavelets, fewer_than_rows))
+            order = SELECTIONS[self.selection](problem, library, most)
             networks = [solved(problem, library.members(order[:size])) for size in range(len(order) + 1)]
             best = networks[int(np.argmin([criterion_of(problem, each, "bic") for each in networks]))]
             if self.quasi_newton:
@@ -134,28 +133,18 @@ def orthogonal_order(problem: SeparableProblem, library: Library, most: int) -> 
 
 def residual_order(problem: SeparableProblem, library: Library, most: int) -> list[int]:
     """Returns at most `most` candidates, each the one that fits the residual of those before it best."""
-    order: list[int] = []
+    (columns,), (gram,), order = library.columns, library.grams, list[int]()
     while len(order) < min(most, len(library)):
-        gains = residual_gains(library, solved(problem, library.members(order)))
-        gains[order] = -1.0
-        order.append(int(np.argmax(gains)))
+        (residual,) = solved(problem, library.members(order)).residuals
+        falls = (columns[0] @ residual.astype(np.float32)) ** 2 / gram[0, 0]
+        falls[order] = -1.0
+        order.append(int(np.argmax(falls)))
     return order
-
-
-def residual_gains(library: Library, current: Solution) -> Float1D:
-    """Returns the decrease of the residual sum of squares (candidates,) if a candidate were fitted to the
-    residual alone [force^2]."""
-    (columns,), (gram,), (residual,) = library.columns, library.grams, current.residuals
-    along = (columns[0] @ residual.astype(np.float32)).astype(np.float64)
-    return np.asarray(along**2 / np.maximum(gram[0, 0], TINY))
 
 
 def backward_order(problem: SeparableProblem, library: Library, most: int) -> list[int]:
     """Returns an orthogonal selection in the reverse order of removal: the candidate whose removal raises the
-    error least comes last.
-
-    A library has more candidates than the data can distinguish, so elimination starts from a selection.
-    """
+    error least comes last."""
     left, removed = orthogonal_order(problem, library, most), []
     while left:
         costs = problem.removal_costs(solved(problem, library.members(left)))
@@ -188,7 +177,7 @@ def refine_all(problem: SeparableProblem, start: Solution) -> Solution:
 
     def objective(unknown: Float1D) -> tuple[float, Float1D]:
         value, by_coefficients, by_log_alpha, by_beta = gradient(problem, *apart(unknown))
-        slopes = [by_coefficients * scale, by_log_alpha.ravel(), (by_beta / basis.alpha).ravel()]
+        slopes = by_coefficients * scale, by_log_alpha.ravel(), (by_beta / basis.alpha).ravel()
         return value / size**2, np.concatenate(slopes) / size**2
 
     def unknowns(coefficients: Float1D, alpha: Float2D, beta: Float2D) -> Float1D:
@@ -196,20 +185,19 @@ def refine_all(problem: SeparableProblem, start: Solution) -> Solution:
 
     free, ones = np.full(len(scale), np.inf), np.ones_like(basis.alpha)
     finest = np.maximum(problem.finest(basis), basis.alpha)
+    low = unknowns(-free, LEAST_DILATION * ones, -LARGEST_OVERHANG * ones)
+    high = unknowns(free, finest, (1.0 + LARGEST_OVERHANG) * ones)
     found = scipy.optimize.minimize(
         objective,
         unknowns(start.coefficients[0] / scale, basis.alpha, basis.beta),
         jac=True,
         method="L-BFGS-B",
-        bounds=scipy.optimize.Bounds(
-            unknowns(-free, LEAST_DILATION * ones, -LARGEST_OVERHANG * ones),
-            unknowns(free, finest, (1.0 + LARGEST_OVERHANG) * ones),
-        ),
+        bounds=scipy.optimize.Bounds(low, high),
         options={"maxiter": MOST_STEPS, "maxcor": STORED_STEPS, "ftol": 0.0},
     )
     moved = apart(found.x)[1]
-    resolved = np.maximum(problem.finest(moved), LEAST_DILATION)
-    best = problem.solve(Basis(np.minimum(moved.alpha, resolved), moved.beta))
+    finest = np.maximum(problem.finest(moved), LEAST_DILATION)
+    best = problem.solve(Basis(np.minimum(moved.alpha, finest), moved.beta))
     return best if best.objective < start.objective else start
 
 
@@ -218,8 +206,7 @@ def gradient(
 ) -> tuple[float, Float1D, Float2D, Float2D]:
     """Returns the penalised squared error and its derivatives by coefficients (1 + d + N), log(alpha) and
     beta (N, d)."""
-    (block,) = problem.blocks
-    first = 1 + problem.dimension
+    (block,), first = problem.blocks, 1 + problem.dimension
     weights = coefficients[first:]
     columns, by_alpha, by_centre = wavelet_jacobian(block.positions, basis.alpha, basis.beta)
     design = block.design(columns)
@@ -227,9 +214,7 @@ def gradient(
     by_coefficients = -2.0 * (design.T @ rest)
     by_coefficients[first:] += 2.0 * problem.prior * weights
     pull = -2.0 * (rest * block.channels[:, 0])[:, None] * weights
-    by_log_alpha, by_beta = (
-        np.column_stack([np.einsum("mn,mn->n", pull, each) for each in by]) for by in (by_alpha, by_centre)
-    )
+    by_log_alpha, by_beta = (np.einsum("mn,kmn->nk", pull, by) for by in (by_alpha, by_centre))
     value = float(rest @ rest) + problem.prior * float(weights @ weights)
     return value, by_coefficients, by_log_alpha * basis.alpha, by_beta
 

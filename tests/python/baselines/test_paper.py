@@ -15,7 +15,6 @@ from palpate.baselines.paper import (
     gradient,
     orthogonal_order,
     refine_all,
-    residual_gains,
     residual_order,
     solved,
 )
@@ -125,7 +124,6 @@ def test_residual_selection_takes_the_best_fit_of_the_residual() -> None:
     for index in range(len(library)):
         column = np.sqrt(problem.blocks[0].channels[:, 0] ** 2) * library.members([index]).columns(x)[:, 0]
         gains.append((column @ residual) ** 2 / (column @ column))
-    np.testing.assert_allclose(residual_gains(library, current), gains, rtol=1e-3, atol=1e-5 * max(gains))
     assert order[5] == int(np.argmax(np.where(np.isin(np.arange(len(library)), order[:5]), -1.0, gains)))
 
 

@@ -136,13 +136,7 @@ class Growth:
         self._single, self._periodic = single, options.period is not None
 
     def grow(
-        self,
-        problem: SeparableProblem,
-        start: Basis,
-        model_class: str,
-        *,
-        most: int | None = None,
-        library: Library | None = None,
+        self, problem: SeparableProblem, start: Basis, model_class: str, *, most: int | None = None
     ) -> Grown:
         """Grows from the wavelets of start to `most` wavelets at most; an order of harmonics counts as one.
 
@@ -151,30 +145,23 @@ class Growth:
         """
         most, criterion = self._most if most is None else most, self._criterion
         if not self._periodic:
-            return self._grown_finer(problem, start, model_class, most, library)
+            return self._grown_finer(problem, start, model_class, most)
         problem = problem.with_prior(problem.solve(start).rss)
         few = min(most, MOST_WITH_HARMONICS)
         orders = select_orders(
             problem, start, max_wavelets=few, criterion=criterion, patience=self._search.patience
         )
-        both = self._grown_finer(problem, orders[-1].basis, model_class, few, library)
+        both = self._grown_finer(problem, orders[-1].basis, model_class, few)
         passed = tuple(self._point(problem, each, model_class) for each in orders)
         both = replace(both, path=(*passed, *both.path))
         fewer = problem.n_parameters(both.solution.basis) // (2 * problem.dimension + problem.n_channels)
-        alone = self._grown_finer(problem, start.without_harmonics(), model_class, min(most, fewer), library)
+        alone = self._grown_finer(problem, start.without_harmonics(), model_class, min(most, fewer))
         if alone.stop_reason == "max_wavelets" and fewer < most:
             alone = replace(alone, stop_reason=criterion)
         compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
         return (alone, both)[choice(criterion, [alone.criterion, both.criterion], compared)]
 
-    def _grown_finer(
-        self,
-        problem: SeparableProblem,
-        start: Basis,
-        model_class: str,
-        most: int,
-        library: Library | None,
-    ) -> Grown:
+    def _grown_finer(self, problem: SeparableProblem, start: Basis, model_class: str, most: int) -> Grown:
         """Grows from the wavelets and harmonics of start to `most` of both by wavelets.
 
         If the residual is not noise, growth continues with narrower wavelets. Noise has the same size at all
@@ -188,7 +175,7 @@ class Growth:
         several = problem.dimension > 1
         wide = free and several
         problem = replace(problem, every_input=problem.dimension < LEAST_PARTIAL_INPUTS)
-        found = self._grown(problem, start, model_class, most, library=library, wide=wide, in_parts=several)
+        found = self._grown(problem, start, model_class, most, wide=wide, in_parts=several)
         problem = found.problem
         settled = wide and _below_resolution(problem, problem.rmse(found.solution))
         if not free or settled or len(found.solution.basis) == 0:
@@ -265,7 +252,6 @@ class Growth:
         model_class: str,
         most: int,
         *,
-        library: Library | None = None,
         patience: int | None = None,
         wide: bool = False,
         in_parts: bool = False,
@@ -290,7 +276,7 @@ class Growth:
             grown_there = self._grown(part, start, model_class, most, wide=wide, in_parts=True)
             start, patience, wide = grown_there.solution.basis, search.patience, False
         compared = problem if problem.dimension == 1 else problem.part(MOST_LIBRARY_ROWS)
-        library = library or self.library(compared)
+        library = self.library(compared)
         problem = problem.with_prior(problem.solve(start).rss)
         problem, current = self._improved(problem, problem.solve(start), search.refine_steps)
         path, grown = [self._point(problem, current, model_class)], [current]
@@ -371,12 +357,11 @@ class Growth:
         whole = compared.blocks is problem.blocks
         compared = replace(compared, prior=problem.prior)
         start = current if whole else compared.solve(current.basis)
-        several = problem.dimension > 1
         gains = self._gains(compared, library, start)
-        if several:
+        if problem.dimension > 1:
             library = library.stretched(compared, _falling(gains)[:MOST_STRETCHED])
             gains = self._gains(compared, library, start)
-        chosen = library.distinct(_falling(gains), MOST_REFINED_CANDIDATES if several else 1)
+        chosen = library.distinct(_falling(gains), MOST_REFINED_CANDIDATES if problem.dimension > 1 else 1)
         tried = [compared.solve(start.basis.joined(library.members([index]))) for index in chosen]
         if not tried:
             return None

@@ -6,7 +6,7 @@ import pytest
 
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
-from palpate.identification.network.basis import Basis, truncated_frame
+from palpate.identification.network.basis import Basis
 from palpate.identification.network.separable import (
     LARGEST_OVERHANG,
     LEAST_DILATION,
@@ -16,7 +16,6 @@ from palpate.identification.network.separable import (
 )
 from palpate.identification.search.evidence import criterion_of
 from palpate.identification.search.growth import Growth
-from palpate.identification.search.selection import Library
 
 
 def hat(x: np.ndarray, alpha: float, beta: float) -> np.ndarray:
@@ -110,11 +109,8 @@ def test_growth_finds_the_number_of_generating_wavelets() -> None:
     y = 3.0 * x + hat(x, 20.0, 0.3) - 0.5 * hat(x, 9.0, 0.7)
     y = y + np.random.default_rng(1).normal(0.0, 0.01, len(x))
     problem = problem_from(x, y)
-    frame = truncated_frame(
-        x[:, None], coarsest=1.0, finest=200.0, frame_scale=2.0, frame_step=0.5, max_candidates=4096
-    )
     options = IdentifyOptions()
-    grown = Growth(options).grow(problem, Basis.empty(1), "position", library=Library(problem, frame))
+    grown = Growth(options).grow(problem, Basis.empty(1), "position")
     assert len(grown.solution.basis) == 2
     assert grown.stop_reason == "bic"
     assert grown.criterion == criterion_of(problem, grown.solution, options.criterion)
@@ -124,11 +120,8 @@ def test_growth_finds_the_number_of_generating_wavelets() -> None:
 def test_stop_reason_is_max_wavelets_at_the_limit() -> None:
     x = np.linspace(0.0, 1.0, 300)
     problem = problem_from(x, np.sin(30.0 * x))
-    frame = truncated_frame(
-        x[:, None], coarsest=1.0, finest=64.0, frame_scale=2.0, frame_step=0.5, max_candidates=4096
-    )
     options = IdentifyOptions(max_wavelets=3)
-    grown = Growth(options).grow(problem, Basis.empty(1), "position", library=Library(problem, frame))
+    grown = Growth(options).grow(problem, Basis.empty(1), "position")
     assert (len(grown.solution.basis), grown.stop_reason) == (3, "max_wavelets")
     assert [point.n_wavelets for point in grown.path] == [0, 1, 2, 3, 3]
 
