@@ -2,6 +2,7 @@
 """palpate identify: written and printed results, and one clear sentence for every wrong input."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -157,6 +158,25 @@ def test_notes_of_the_identification_are_printed(folder: Path, capsys: pytest.Ca
     assert notes
     details = " ".join(capsys.readouterr().out.split())
     assert all(" ".join(note.split()) in details for note in notes)
+
+
+def test_the_line_on_rows_explains_every_row_without_an_error(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(4)
+    way, stroke = np.linspace(-400.0, -0.2, 40, endpoint=False), np.linspace(-0.2, 4.0, 1000)
+    position = np.concatenate([way, stroke, np.full(60, 4.0), stroke[::-1], way[::-1]])
+    force = np.maximum(12.0 * position, 0.0) + 8.0 * np.maximum(position - 2.0, 0.0)
+    force += rng.normal(0.0, 0.05, len(force))
+    force[[500, 1500]] = 1e3
+    again = np.repeat(np.arange(len(force)), 2)
+    Recording.from_arrays(position[again], force[again]).write(folder / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    used, given = map(int, re.findall(r"on (\d+) of (\d+) rows", printed)[0])
+    counts = re.findall(r"(\d+) of \d+ rows (repeat|are wrong|are far|are not fitted)", printed)
+    assert [reason for _, reason in counts] == ["repeat", "are wrong", "are far", "are not fitted"]
+    assert sum(int(count) for count, _ in counts) == given - used
 
 
 def test_a_torque_constant_converts_current_to_torque(

@@ -17,7 +17,7 @@ from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
-from ..data.rows import Rows, period_notes
+from ..data.rows import period_notes
 from ..log import Log, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
@@ -96,7 +96,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
     unused = np.flatnonzero(~data.fitted)
     if not len(unused) or best.error.spread == 0.0:
         return []
-    box, force, band = data.box[unused], data.force[unused], noise_band(data.path[:, 0])
+    box, force, band = data.box[unused], best.static_force[unused], noise_band(data.path[:, 0])
     low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
     for shift in (-band, 0.0, band):
         near = np.clip(box + shift, 0.0, 1.0)
@@ -255,15 +255,15 @@ def _floor(best: Candidate) -> float:
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
-def _pulls(data: Rows, near_zero: float) -> bool:
+def _pulls(best: Candidate, near_zero: float) -> bool:
     """Returns True if the object pulls the tool in more than one row of each press, or of each release, that
     passes the place of the pull. A zero that moves, or one stroke with the wrong sign, shows a pull that
     other strokes do not show."""
-    rows = np.flatnonzero(data.reported)
+    data, rows = best.data, np.flatnonzero(best.data.reported)
     direction = strokes_from_order(data.path[rows, 0]) if data.side is None else data.side[rows]
+    box, pulled = data.box[rows, 0], best.static_force[rows] < -near_zero
     if direction is None or not direction.any():
-        return bool(np.count_nonzero(data.force[rows] < -near_zero) > 1)
-    box, pulled = data.box[rows, 0], data.force[rows] < -near_zero
+        return bool(np.count_nonzero(pulled) > 1)
     starts = np.flatnonzero(np.diff(direction, prepend=np.nan))
     in_stroke = np.add.reduceat(pulled.astype(np.intp), starts) > 1
     first, last = np.minimum.reduceat(box, starts), np.maximum.reduceat(box, starts)
@@ -279,7 +279,7 @@ def _first_contact(best: Candidate, near_zero: float) -> float:
     of a pull that no row shows. Between few rows before the contact a network can pull; its continuation
     does not."""
     data = best.data
-    pressed = data.box[data.fitted & (data.force > near_zero), 0]
+    pressed = data.box[data.fitted & (best.static_force > near_zero), 0]
     position = np.linspace(0.0, float(pressed.min()) if len(pressed) else 0.0, COMPARED_POSITIONS)
     middle, half = best.parts_at(position[:, None])
     least = middle - np.abs(half)
@@ -336,7 +336,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     below, lower = options.below, network.lower
     if below == "auto":
         near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
-        leaves = single and data.period is None and not _pulls(data, max(best.rmse, near_zero))
+        leaves = single and data.period is None and not _pulls(best, max(best.rmse, near_zero))
         below = "free" if leaves else "linear"
         if leaves:
             lower = lower + data.reach[0] * _first_contact(best, near_zero)

@@ -150,7 +150,7 @@ class Velocity(ModelClass):
         damped = moving is not None and moving.mass is None
         if not (damped or below.settled.nrmse > USABLE_NRMSE):
             return below
-        residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
+        residual = below.static_force - below.force_at()
         if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
             return below
         velocity, known = motion.velocity()

@@ -93,7 +93,7 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     band = None if _pure_error(best, repeats) is None else _band(best, best.residual, used, repeats)
     squares, rows, within, judged = 0.0, 0, 0, 0
     group, data = repeats.groups, best.data
-    force = data.force if best.moving is None else data.force - best.moving.force
+    force = best.static_force
     compressor = Compressor(
         data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
     )
@@ -134,7 +134,7 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     """
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
-    force = data.force if best.moving is None else data.force - best.moving.force
+    force = best.static_force
     compressor = Compressor(
         data.box,
         force,

@@ -238,6 +238,11 @@ class Candidate:
         return self.share if self.data.weight is None else self.share * self.data.weight
 
     @property
+    def static_force(self) -> Float1D:
+        """(n,) recorded force of every row without the forces of mass and damping."""
+        return self.data.force if self.moving is None else self.data.force - self.moving.force
+
+    @property
     def play_radius(self) -> float | None:
         """[box]"""
         return None if self.strokes is None else self.strokes.play_radius
@@ -312,8 +317,7 @@ class Candidate:
     @cached_property
     def residual(self) -> Float1D:
         """Recorded force of every row (n,) minus the force of the network, of the mass and of the damping."""
-        residual = self.data.force - self.network.force(self.data.domain, self.side)
-        return residual if self.moving is None else residual - self.moving.force
+        return self.static_force - self.network.force(self.data.domain, self.side)
 
     @cached_property
     def error(self) -> RowError:

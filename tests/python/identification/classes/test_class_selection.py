@@ -102,7 +102,7 @@ def test_rows_without_direction_are_dropped_and_counted() -> None:
     network = fit_environment(x[:, None], y, side)
     assert network.model_class == "hysteresis"
     assert network.rmse < 0.03
-    assert "30 rows without a direction are not used to test hysteresis." in network.notes
+    assert "30 rows without a direction are not used to test hysteresis." in network.log.rows
 
 
 def test_rows_without_direction_are_used_if_hysteresis_is_not_accepted() -> None:
@@ -131,7 +131,9 @@ def test_strokes_that_gain_energy_do_not_become_a_rapidly_changing_force() -> No
     force = wavelet_columns(between, network.alpha, network.beta) @ network.weight
     force = force + network.linear[0] * between + network.bias
     assert np.abs(force - 0.3 * between).max() < 0.05
-    assert any(note.startswith("hysteresis: press force >= release force imposed") for note in network.notes)
+    assert any(
+        note.startswith("hysteresis: press force >= release force imposed") for note in network.log.notes
+    )
 
 
 def test_noise_in_rows_unused_by_a_model_class_does_not_favour_it() -> None:
@@ -141,7 +143,7 @@ def test_noise_in_rows_unused_by_a_model_class_does_not_favour_it() -> None:
         x = 1.0 - np.abs((2.0 * time) % 2.0 - 1.0)
         noise = np.random.default_rng(draw).normal(0.0, 0.01, len(x))
         network = fit_environment(x[:, None], 3.0 * x + noise, starts=[0])
-        decision = network.decisions[-1]
+        decision = network.log.decisions[-1]
         assert (decision.model_class, decision.outcome) == ("hysteresis", "not accepted")
         assert decision.reason.startswith("raises BIC by ")
 
@@ -324,11 +326,11 @@ def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.
 
 def sentences(network: FittedNetwork) -> str:
     """Returns the decisions of the model selection as text, one line for each model class."""
-    return "\n".join(map(str, network.decisions))
+    return "\n".join(map(str, network.log.decisions))
 
 
 def sign_findings(network: FittedNetwork) -> list[str]:
-    return [finding.sentence for finding in network.findings if "gains energy" in finding.sentence]
+    return [finding.sentence for finding in network.log.findings if "gains energy" in finding.sentence]
 
 
 def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> None:
@@ -357,7 +359,7 @@ def test_wavelet_limit_is_reported_if_the_error_is_structured() -> None:
 
     def reported(max_wavelets: int) -> list[str]:
         network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=max_wavelets))
-        return [finding.sentence for finding in network.findings if "--max-wavelets" in finding.sentence]
+        return [finding.sentence for finding in network.log.findings if "--max-wavelets" in finding.sentence]
 
     (sentence,) = reported(12)
     assert "12 wavelets, the largest number allowed" in sentence
@@ -372,4 +374,4 @@ def test_wavelet_limit_is_not_reported_if_the_error_is_noise() -> None:
     force = 0.3 * np.exp(-0.5 * ((x - 0.5) / 0.1) ** 2) + np.random.default_rng(0).normal(0.0, 0.05, 400)
     network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=1))
     assert network.stop_reason == "max_wavelets"
-    assert not any("--max-wavelets" in finding.sentence for finding in network.findings)
+    assert not any("--max-wavelets" in finding.sentence for finding in network.log.findings)

@@ -53,6 +53,19 @@ def moved(
     )
 
 
+def test_a_pull_that_the_force_of_a_mass_hides_is_part_of_the_model() -> None:
+    """At the lowest positions of a fast motion the mass pushes more than the object pulls."""
+    time = 1e-3 * np.arange(5000.0)
+    x = 0.15 * np.sin(2.0 * np.pi * (8.0 * time - 0.7 * time**2))
+    force = 2.0 * x + 1e-3 * np.gradient(np.gradient(x, time), time)
+    noise = np.random.default_rng(0).normal(0.0, 0.002, len(x))
+    model = identify(Recording.from_arrays(x, force + noise, time=time))
+    assert model.mass == pytest.approx(1e-3, rel=0.05)
+    assert model.below == "linear"
+    at = np.linspace(x.min(), x.max(), 50)
+    np.testing.assert_allclose(model.force(at), 2.0 * at, atol=0.01)
+
+
 def test_mass_and_damping_are_recovered_from_one_recording() -> None:
     for seed in range(1 if SCALE == 1 else 20):
         recording = moved(seed, seconds=6.0 * SECONDS, mass=1e-3, damping=0.06)

@@ -73,7 +73,7 @@ def test_six_inputs_and_many_rows_need_no_grid() -> None:
         IdentifyOptions(max_wavelets=6, search=SearchOptions(max_positions=64)),
     )
     assert network.nrmse < 0.5
-    assert any("rows are used, evenly spread" in note for note in network.notes)
+    assert any("rows are used, evenly spread" in note for note in network.log.rows)
 
 
 def test_columns_are_named_as_in_the_file_and_their_units_converted(

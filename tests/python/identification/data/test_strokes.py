@@ -134,14 +134,14 @@ def test_two_strokes_in_one_file_without_order_are_not_good_and_hysteresis_is_no
 def test_one_stroke_with_noise_gives_no_finding(noise: float, step: float) -> None:
     force = loop(noise=noise)
     force = np.round(force / step) * step if step else force
-    assert not strokes_of([bare(PRESS, force)]).findings
+    assert not strokes_of([bare(PRESS, force)]).log.findings
 
 
 @pytest.mark.parametrize("times", [2, 3, 4, 5, 6, 7, 10])
 def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> None:
     rows = np.repeat(PRESS, times)
     for seed in range(4):
-        assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))]).findings
+        assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))]).log.findings
 
 
 def test_equal_strokes_do_not_change_the_model() -> None:

@@ -177,7 +177,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
     assert g_and_h(bounded, fine)[1].min() >= 0.0
     assert g_and_h(free, fine)[1].min() < 0.0
     assert bounded.rmse <= 1.02 * free.rmse
-    assert any("press force >= release force imposed" in note for note in bounded.notes)
+    assert any("press force >= release force imposed" in note for note in bounded.log.notes)
 
 
 def test_crossing_strokes_are_replaced_by_their_mean() -> None:
@@ -206,7 +206,7 @@ def test_slope_bounds_and_a_coupling_limit_the_slope_everywhere() -> None:
         assert slope.min() >= low
         assert slope.max() <= high
         assert slope.max() > 0.9 * high
-        assert any("slope bounds imposed" in note for note in network.notes)
+        assert any("slope bounds imposed" in note for note in network.log.notes)
 
 
 def test_the_slope_limited_fit_is_close_to_the_nearest_slope_limited_force() -> None:
@@ -233,7 +233,7 @@ def test_a_monotone_force_never_falls() -> None:
     assert (columns @ network.weight + network.linear[0]).min() >= 0.0
     assert any(
         "slope bounds imposed over the whole domain, which changes the RMS error from" in note
-        for note in network.notes
+        for note in network.log.notes
     )
 
 
@@ -249,7 +249,7 @@ def test_fixed_force_is_kept_with_small_error(hysteresis: bool) -> None:
     assert g_and_h(fixed, np.zeros(1))[0][0] == pytest.approx(0.03, abs=1e-7)
     assert abs(g_and_h(free, np.zeros(1))[0][0] - 0.03) > 1e-5
     assert fixed.rmse <= 1.02 * free.rmse
-    assert any("fixed force" in note and "imposed" in note for note in fixed.notes)
+    assert any("fixed force" in note and "imposed" in note for note in fixed.log.notes)
 
 
 def test_a_fixed_force_outside_the_data_is_refused() -> None:
@@ -282,7 +282,7 @@ def reported(recording: Recording) -> list[str]:
     assert recording.direction is not None
     network = fit_environment(recording.position[:, None], recording.force, recording.direction.astype(float))
     assert network.model_class == "hysteresis"
-    return [note for note in network.notes if "release is up to" in note]
+    return [note for note in network.log.notes if "release is up to" in note]
 
 
 @pytest.mark.parametrize("seed", sampled(range(2), 0))
