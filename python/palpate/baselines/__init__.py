@@ -4,7 +4,7 @@
 All methods have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force,
 ``n_parameters_`` counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and
 acceleration; for `PerStroke` the stroke is one more column. The paper's own identification is
-:class:`PaperNetwork`, with :func:`paper_force` for its filters.
+:class:`palpate.baselines.PaperNetwork`, with :func:`palpate.baselines.paper_force` for its filters.
 """
 
 from .comparison import PASSIVE_SPLINE, Compared, baselines, comparable, compare

@@ -82,11 +82,13 @@ class PaperNetwork:
         palpate.InputError
             A value is not finite, or a column of X does not vary.
         """
-        if not (np.isfinite(X).all() and np.isfinite(y).all()):
-            raise InputError("X or y contains NaN or infinity: every value must be a finite number")
+        for name, values in (("X", X), ("y", y)):
+            if len(bad := values[~np.isfinite(values)]):
+                raise InputError(f"{name} contains {bad[0]}: every value must be a finite number")
         self.lower_, self.reach_ = X.min(axis=0), np.ptp(X, axis=0)
         if not self.reach_.all():
-            raise InputError(f"column {int(np.argmin(self.reach_))} of X is constant: it must vary")
+            column = int(np.argmin(self.reach_))
+            raise InputError(f"column {column} of X is {X[0, column]:g} in every row: it must vary")
         options, d = IdentifyOptions(), X.shape[1]
         cells = options.search.max_positions * POSITION_FACTORS[min(d, len(POSITION_FACTORS)) - 1]
         with one_thread():
