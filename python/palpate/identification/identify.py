@@ -390,7 +390,7 @@ def model_of(
         notes={
             "model_selection": [str(decision) for decision in network.log.decisions],
             "rows": network.log.rows,
-            "identification": network.log.notes,
+            "identification": [*network.log.notes, *network.band_check],
             "left_out_nrmse": network.left_out_nrmse,
             "error_rows": network.residuals,
             "verdict": verdict.record(),

@@ -154,8 +154,10 @@ def test_notes_of_the_identification_are_printed(folder: Path, capsys: pytest.Ca
         folder / "a.csv"
     )
     assert main(["identify", "a.csv", "-o", "m.json", "--verbose"]) == 0
-    notes = load_model(folder / "m.json").notes["identification"]
-    assert notes
+    stored = load_model(folder / "m.json").notes
+    notes = [*stored["rows"], *stored["identification"]]
+    assert stored["rows"]
+    assert stored["identification"]
     details = " ".join(capsys.readouterr().out.split())
     assert all(" ".join(note.split()) in details for note in notes)
 

@@ -446,7 +446,7 @@ def test_every_row_is_used_once_where_text_appears_late(tmp_path: Path, size: st
     model = palpate.identify_files(file, invalid="drop", part_rows=part_rows, max_wavelets=1)
     assert model.data.rows == n - 2
     note = f"dropped 2 rows without a finite number in torque_Nm (first: line {n // 2 + 2})"
-    assert model.notes["identification"][0] == note
+    assert model.notes["rows"][0] == note
 
 
 def test_dropped_rows_are_reported_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -527,9 +527,7 @@ def test_rows_with_a_force_not_from_the_model_are_dropped_and_counted(tmp_path: 
     model = palpate.identify_files(file)
     assert model.data.rows == 979
     assert model.fit.nrmse < 1e-3
-    assert model.notes["identification"][0] == (
-        "left out 21 rows whose force is not the model's force (21 Starting)"
-    )
+    assert model.notes["rows"][0] == ("left out 21 rows whose force is not the model's force (21 Starting)")
 
 
 def test_segment_numbers_are_not_taken_as_direction(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_an_approach_does_not_change_the_model(rows: int, travels: float) -> Non
     assert model.verdict.level == "good"
     at = np.linspace(0.0, 4.0, 200)
     assert np.abs(model.force(at) - near.force(at)).max() < 0.05
-    assert "rows are far from the contact and were dropped" in str(model.notes["identification"])
+    assert "rows are far from the contact and were dropped" in str(model.notes["rows"])
     assert "compared, fewer than" not in str(palpate.verify(model, far).verdict)
 
 
@@ -151,7 +151,7 @@ def test_waiting_rows_change_neither_size_nor_verdict_of_the_model(
     assert model.force(at_middle, direction=press) == pytest.approx(
         without_wait.force(at_middle, direction=press), rel=1e-3
     )
-    assert f"of {300 + rows} rows are not fitted: " in str(model.notes["identification"])
+    assert f"of {300 + rows} rows are not fitted: " in str(model.notes["rows"])
 
 
 @pytest.mark.parametrize("held", [2, 4])
@@ -166,7 +166,7 @@ def test_rows_of_a_hold_at_the_end_do_not_bend_the_curve(held: int) -> None:
 
 def test_several_recordings_are_fitted_without_the_waits_of_each() -> None:
     model = palpate.identify([recorded(*with_wait(rows, 0)) for rows in (0, 300, 5000)])
-    note = " ".join(model.notes["identification"])
+    note = " ".join(model.notes["rows"])
     assert "5302 of 6200 rows are not fitted" in note
     assert model.n_wavelets <= 8
 

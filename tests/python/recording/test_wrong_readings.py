@@ -46,7 +46,7 @@ def test_position_spikes_are_left_out_and_counted(at: dict[int, float]) -> None:
     assert true_nrmse(model, wall) < 1.5 * true_nrmse(clean, wall) < 0.002
     assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.01)
     assert model.domain[1][0] == pytest.approx(TRAVEL, rel=1e-3)
-    (note,) = (each for each in model.notes["identification"] if "wrong readings" in each)
+    (note,) = (each for each in model.notes["rows"] if "wrong readings" in each)
     assert note.startswith(f"{len(at)} of {N} rows")
     assert "were dropped" in note
 
@@ -56,15 +56,15 @@ def test_force_spikes_are_left_out_and_counted() -> None:
     y = wall(x) + noise(N)
     model = palpate.identify(recorded(x, changed(y, {5100: 1.4e7, 100: -1e9, 999: 500.0})))
     assert true_nrmse(model, wall) < 0.001
-    assert any(f"3 of {N} rows are wrong readings" in each for each in model.notes["identification"])
-    assert any("row 100: -1e+09 at " in each for each in model.notes["identification"])
+    assert any(f"3 of {N} rows are wrong readings" in each for each in model.notes["rows"])
+    assert any("row 100: -1e+09 at " in each for each in model.notes["rows"])
 
 
 def test_one_spike_in_few_rows_is_left_out() -> None:
     x = sweep(50)
     model = palpate.identify(recorded(changed(x, {25: 6e5}), wall(x)))
     assert true_nrmse(model, wall) < 0.02
-    assert any("1 of 50 rows" in each for each in model.notes["identification"])
+    assert any("1 of 50 rows" in each for each in model.notes["rows"])
 
 
 def test_position_far_from_all_others_is_named_if_rows_have_no_order() -> None:
@@ -190,7 +190,7 @@ def test_files_read_part_by_part_drop_and_count_wrong_readings(tmp_path: Path, c
         frame.to_csv(tmp_path / f"{name}.csv", index=False)
         models.append(identify_files(tmp_path / f"{name}.csv"))
     assert np.array_equal(models[0].weight, models[1].weight)
-    (note,) = [note for note in models[1].notes["identification"] if "wrong reading" in note]
+    (note,) = [note for note in models[1].notes["rows"] if "wrong reading" in note]
     assert note == "dropped 2 rows with a wrong reading (first: line 5102)"
 
 
@@ -219,7 +219,7 @@ def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> 
     model, clean = palpate.identify(recorded(PRESS, y)), palpate.identify(recorded(PRESS, FORCE))
     x, press = np.linspace(0.0, 4.0, 500), np.ones(500)
     assert float(np.abs(model.force(x, direction=press) - clean.force(x, direction=press)).max()) < 0.1
-    (note,) = [note for note in model.notes["identification"] if "wrong readings" in note]
+    (note,) = [note for note in model.notes["rows"] if "wrong readings" in note]
     row, force = next(iter(at.items()))
     assert note.startswith(f"{len(at)} of 800 rows are wrong readings and were dropped")
     assert f": row {row}: {force:g} at " in note
@@ -291,7 +291,7 @@ def test_a_wrong_reading_on_a_steep_part_is_found_with_the_model() -> None:
     y[[150, 250]] += [3.0, 900.0]
     assert wrong_rows(x, y) == [250]
     model = palpate.identify(x, y)
-    (note,) = (each for each in model.notes["identification"] if "wrong reading" in each)
+    (note,) = (each for each in model.notes["rows"] if "wrong reading" in each)
     assert note.startswith("2 of 400 rows are wrong readings and were dropped: row 150: ")
     assert ", row 250: 1020 at " in note
     assert model.notes["roles"]["wrong reading"] == 2

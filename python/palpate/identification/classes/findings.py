@@ -359,7 +359,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             log.path,
             decisions,
             data.log.rows + log.rows,
-            [*notes, *log.notes, *(f"Replaced decision: {each}." for each in replaced), *checked],
+            [*notes, *log.notes, *(f"Replaced decision: {each}." for each in replaced)],
             findings,
         ),
+        band_check=checked,
     )

@@ -116,6 +116,8 @@ class FittedNetwork:
     correlated"""
     band: Band | None = None
     """Band of a further recording; None for one recording"""
+    band_check: tuple[str, ...] = ()
+    """Sentence on the check of the band, or on a missing band; empty for one recording"""
     log: Log = field(default_factory=Log)
     """Tested networks, decisions, sentences and findings"""
 

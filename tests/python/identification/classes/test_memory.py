@@ -71,7 +71,7 @@ def test_known_branches_are_found(tau: list[float]) -> None:
     assert any("memory: accepted" in line for line in model.notes["model_selection"])
     assert any("s are resolved by the recordings" in line for line in model.notes["identification"])
     assert model.notes["roles"]["wait in contact"] > 0
-    assert not any("not fitted" in line for line in model.notes["identification"]), "a memory fits all rows"
+    assert not any("not fitted" in line for line in model.notes["rows"]), "a memory fits all rows"
 
 
 def pressed_twice() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

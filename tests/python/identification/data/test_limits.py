@@ -102,8 +102,9 @@ def test_wall_is_found_with_few_wavelets(name: str) -> None:
 def test_independent_exact_rows_are_not_limited(law: Law) -> None:
     x, force = sweep(N), law(sweep(N)) + noise(N)
     assert RowLimits(force_error=force_step(force)) == NO_LIMITS
-    notes = palpate.identify(recorded(x, force)).notes["identification"]
-    assert not any("correlated" in note or "once" in note for note in notes)
+    model = palpate.identify(recorded(x, force))
+    assert not any("correlated" in note for note in model.notes["identification"])
+    assert not any("once" in note for note in model.notes["rows"])
 
 
 def test_structure_left_by_a_line_is_not_taken_for_noise() -> None:
@@ -146,7 +147,7 @@ def test_repeated_rows_change_neither_model_nor_verdict(times: int) -> None:
     assert np.array_equal(model.weight, once.weight)
     assert (model.verdict, again.verdict) == (once.verdict, once.verdict)
     assert model.notes["roles"]["repeated"] == 800 * (times - 1)
-    assert f"{800 * (times - 1)} of {800 * times} rows repeat" in model.notes["identification"][0]
+    assert f"{800 * (times - 1)} of {800 * times} rows repeat" in model.notes["rows"][0]
 
 
 @pytest.mark.full

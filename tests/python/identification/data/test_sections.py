@@ -118,8 +118,6 @@ def test_a_long_recording_has_the_model_of_its_force_law() -> None:
     long = Recording.from_arrays(position, 3.0 * position + random.normal(0.0, 0.05, rows))
     model = identify(long)
     assert model.data.rows < rows
-    assert model.notes["identification"][0].startswith(
-        f"{model.data.rows} of {rows} rows are used for the fit"
-    )
+    assert model.notes["rows"][0].startswith(f"{model.data.rows} of {rows} rows are used for the fit")
     fresh = Recording.from_arrays(position[:5_000], 3.0 * position[:5_000])
     assert verify(model, fresh).nrmse < 1e-3
