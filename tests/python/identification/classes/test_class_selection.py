@@ -181,12 +181,12 @@ def test_path_contains_every_considered_network() -> None:
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    classes = [point.model_class for point in network.path]
+    classes = [point.model_class for point in network.log.path]
     assert classes[:2] == ["constant", "linear"]
-    sizes = [point.n_wavelets for point in network.path if point.model_class == "position"]
+    sizes = [point.n_wavelets for point in network.log.path if point.model_class == "position"]
     assert sizes[:-1] == list(range(len(sizes) - 1))
     assert sizes[-1] == len(network.weight)
-    assert network.path[-1].rmse == pytest.approx(network.rmse)
+    assert network.log.path[-1].rmse == pytest.approx(network.rmse)
     assert network.stop_reason == "bic"
 
 

@@ -47,8 +47,8 @@ def test_criteria_on_held_out_rows_stop_earlier_and_set_stop_reason(criterion: s
     plain = fit_environment(x[:, None], y)
     assert network.stop_reason == criterion
     assert 1 <= len(network.weight) <= len(plain.weight)
-    assert np.ptp([point.criterion for point in network.path]) > 0.0
-    fitted = [point for point in network.path if point.model_class == "position"]
+    assert np.ptp([point.criterion for point in network.log.path]) > 0.0
+    fitted = [point for point in network.log.path if point.model_class == "position"]
     assert fitted[-1].n_wavelets <= max(point.n_wavelets for point in fitted)
 
 
