@@ -37,7 +37,7 @@ class Role(IntEnum):
     HOLD = 3
     """The tool waits in contact"""
     REPEATED = 4
-    """The row repeats the reading of a sensor that is slower than the recorder"""
+    """The tool moves, and the row repeats the reading of a sensor that is slower than the recorder"""
 
 
 AIR_MARGIN = 0.1
@@ -71,7 +71,6 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])
-    waiting &= role == Role.MOVING
     role[waiting] = np.where(position <= contact, Role.REST, Role.HOLD)[waiting]
     if deepest is not None:
         role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
@@ -116,7 +115,7 @@ class Informative:
         self._dropped: dict[tuple[int, str], NDArray[np.intp]] = {}
         """Rows that were dropped, by the number of the recording and the reason"""
         for number, recording in enumerate(recordings):
-            self._drop(number, roles_of(recording) == Role.REPEATED, "repeated")
+            self._drop(number, repeated_rows(recording), "repeated")
         self.drop_wrong_readings()
         deepest = max(float(each.position.max()) for each in self.recordings)
         for number, recording in enumerate(self.recordings):

@@ -30,9 +30,9 @@ def counts(x: Array, f: Array) -> list[int]:
 
 
 def test_a_motion_without_a_wait_has_only_moving_rows() -> None:
-    assert counts(MOTION, loop(MOTION)) == [300, 0, 0, 0]
+    assert counts(MOTION, loop(MOTION)) == [300, 0, 0, 0, 0]
     press = MOTION[:150]
-    assert counts(press, 12.0 * press) == [150, 0, 0, 0]
+    assert counts(press, 12.0 * press) == [150, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("rows", [300, 5000])
@@ -105,13 +105,13 @@ def test_a_contact_at_the_largest_position_is_found() -> None:
 @pytest.mark.parametrize("rows", [10, 8, 7])
 def test_few_rows_all_move(rows: int) -> None:
     x = np.linspace(0.0, 1.0, rows)
-    assert counts(x, 3.0 * x) == [rows, 0, 0, 0]
+    assert counts(x, 3.0 * x) == [rows, 0, 0, 0, 0]
 
 
 def test_a_recording_in_which_everything_waits_has_only_moving_rows_and_no_model() -> None:
     rng = np.random.default_rng(0)
     x, f = rng.normal(0.0, 1e-3, 300), rng.normal(0.0, 1.0, 300)
-    assert counts(x, f) == [300, 0, 0, 0]
+    assert counts(x, f) == [300, 0, 0, 0, 0]
     assert palpate.identify(recorded(x, f)).verdict.level == "no"
 
 
