@@ -388,21 +388,24 @@ int connect(int file, const sockaddr* address, socklen_t size) {
     return code;
 }
 
-/// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. If none
-/// arrives within a second of real time after the drive has read the message, the virtual time of the wait passes.
+/// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. The drive
+/// takes a message from its socket only after it has sent the answers. If it has taken all messages and nothing can be
+/// read, no answer follows, and the virtual time of the wait passes.
 int ppoll(pollfd* files, nfds_t count, const timespec* timeout, const sigset_t* mask) {
     if (!is_virtual() || timeout == nullptr) {
         return REAL(ppoll)(files, count, timeout, mask);
     }
-    constexpr timespec patience{1, 0};
-    const auto is_unread = [](const pollfd& file) {
+    constexpr timespec moment{0, second / 1000};
+    constexpr timespec none{};
+    const auto is_not_taken = [](const pollfd& file) {
         int bytes = 0;
         return ::ioctl(file.fd, SIOCOUTQ, &bytes) == 0 && bytes > 0;
     };
-    int ready = REAL(ppoll)(files, count, &patience, mask);
-    while (ready == 0 && std::any_of(files, files + count, is_unread)) {
-        ready = REAL(ppoll)(files, count, &patience, mask);
+    int ready = 0;
+    while (ready == 0 && std::any_of(files, files + count, is_not_taken)) {
+        ready = REAL(ppoll)(files, count, &moment, mask);
     }
+    ready = ready == 0 ? REAL(ppoll)(files, count, &none, mask) : ready;
     if (ready == 0) {
         HostClock::get().sleep(of(*timeout) + now);
     }

@@ -17,6 +17,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass, field
 
+from emulated_device import answer_next
+
 CAN = struct.Struct("=IB3x8s")
 """A struct can_frame of Linux: number, length, data"""
 CAN_FD = struct.Struct("=IBB2x64s")
@@ -122,6 +124,5 @@ class CanMotor(ABC):
     def serve(self, connection: socket.socket) -> None:
         """Answers the frames of one connection until it is closed."""
         with connection, contextlib.suppress(ConnectionError):
-            while frame := connection.recv(CAN_FD.size):
-                for answer in self.replies(frame):
-                    connection.send(answer)
+            while answer_next(connection, self.replies):
+                pass

@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Thread
 from typing import Protocol, TypeVar
@@ -45,6 +45,24 @@ def emulated(path: Path, device: _Device) -> Iterator[_Device]:
         Thread(target=run, daemon=True).start()
         yield device
         listening.shutdown(socket.SHUT_RDWR)
+
+
+MOST_BYTES = 8192
+"""Number of bytes of the largest message."""
+
+
+def answer_next(connection: socket.socket, replies: Callable[[bytes], list[bytes]]) -> bool:
+    """Answers the next message of a connection; returns False if the connection is closed.
+
+    The message is taken from the socket only after its answers were sent. A program in virtual time waits for
+    this, and then knows whether an answer follows.
+    """
+    message = connection.recv(MOST_BYTES, socket.MSG_PEEK)
+    if message:
+        for answer in replies(message):
+            connection.send(answer)
+        connection.recv(MOST_BYTES)
+    return bool(message)
 
 
 def main(device: Served) -> None:

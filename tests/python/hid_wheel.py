@@ -20,7 +20,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-from emulated_device import main
+from emulated_device import answer_next, main
 
 STEP_S = 1e-3
 SUBSTEPS = 10
@@ -365,12 +365,8 @@ class Wheel:
                     self.step(min(passed, 0.05))
                     last += passed
                     connection.send(b"I" + self.axis_report(), socket.MSG_DONTWAIT)
-                if ready:
-                    message = connection.recv(8192)
-                    if not message:
-                        return
-                    for answer in self.replies(message):
-                        connection.send(answer)
+                if ready and not answer_next(connection, self.replies):
+                    return
 
 
 if __name__ == "__main__":

@@ -154,11 +154,16 @@ def test_a_fault_of_the_bus_ends_in_zero_torque(
 
 
 class SlowDrive(Drive):
-    """A drive on a busy machine, which reads its first frame late."""
+    """A drive on a busy machine, which reads and answers its first frame late."""
 
     def serve(self, connection: socket.socket) -> None:
-        time.sleep(1.5)
+        time.sleep(0.2)
         super().serve(connection)
+
+    def replies(self, frame: bytes) -> list[bytes]:
+        if self.commands < 3:
+            time.sleep(0.2)
+        return super().replies(frame)
 
 
 @needs_program
