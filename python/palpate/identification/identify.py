@@ -335,11 +335,10 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
         or not (options.inputs == "auto" or "hysteresis" in options.inputs)
     ):
         return identified(select(rows, options))
-    left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not used to test hysteresis."
-    directed = replace(rows, log=rows.log + Log(rows=[left_out])).only(side != 0)
-    found = identified(select(directed, options))
+    found = identified(select(rows.only(side != 0), options))
     if found.weight_hysteresis is not None:
-        return found
+        left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not fitted."
+        return replace(found, log=found.log + Log(rows=[left_out]))
     # hysteresis was refused, so rows without a direction need not be left out
     every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
     again = identified(select(every_row, options))

@@ -43,16 +43,12 @@ from ..verdict import usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.rows import modulo, require_in_range
-from .data.strokes import DIRECTION_CURE
+from .data.strokes import DIRECTION_CURE, LEAST_KNOWN_SHARE
 from .identify import fit_environment, model_of
 from .log import Decision, Log, in_words
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 from .threads import one_thread
-
-LEAST_KNOWN_SHARE = 0.5
-"""Without a direction column, hysteresis is tested only if the order of rows shows the direction of at least
-this share of the rows [-]."""
 
 MOST_CELLS = 8192
 """Largest number of distinct positions, or of cell widths in the range of positions, in a summary of the

@@ -64,6 +64,14 @@ class Log:
     def __add__(self, other: Log) -> Log:
         return Log(*(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True)))
 
+    def follow(self, later: Log, notes: Iterable[str]) -> None:
+        """Adds notes and the log of a later model selection; only its findings hold."""
+        self.path += later.path
+        self.decisions += later.decisions
+        self.rows += later.rows
+        self.notes += [*notes, *later.notes]
+        self.findings = later.findings
+
     def replaces(self, other: Log, note: str) -> None:
         """Puts the tested networks of a replaced model selection, and the reason for its replacement, in
         front."""

@@ -50,11 +50,11 @@ MOST_NAMED_ROWS = 3
 WRONG_READING = "wrong reading"
 
 DROPPED = {
-    "repeated": "repeat the previous reading and were dropped",
-    WRONG_READING: "are wrong readings and were dropped",
-    "approach": "are far from the contact and were dropped",
+    "repeated": "repeats of the previous reading",
+    WRONG_READING: "wrong readings",
+    "approach": "far from the contact",
 }
-"""What is wrong with the rows that are dropped for a reason, for texts."""
+"""What the rows are that are dropped for a reason, for texts."""
 
 
 def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
@@ -136,7 +136,7 @@ class Informative:
         found = []
         for (number, reason), rows in self._dropped.items():
             where = f"recording {number + 1}: " if len(self._given) > 1 else ""
-            text = f"{where}{len(rows)} of {len(self._given[number])} rows {DROPPED[reason]}"
+            text = f"{where}{len(rows)} of {len(self._given[number])} rows dropped ({DROPPED[reason]})"
             if reason == WRONG_READING:
                 named = [self._reading(number, row) for row in np.sort(rows)[:MOST_NAMED_ROWS].tolist()]
                 text += f": {', '.join(named)}{', and others' * (len(rows) > MOST_NAMED_ROWS)}"

@@ -175,8 +175,8 @@ def test_the_line_on_rows_explains_every_row_without_an_error(
     assert main(["identify", "a.csv", "-o", "m.json"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     used, given = map(int, re.findall(r"on (\d+) of (\d+) rows", printed)[0])
-    counts = re.findall(r"(\d+) of \d+ rows (repeat|are wrong|are far|are not fitted)", printed)
-    assert [reason for _, reason in counts] == ["repeat", "are wrong", "are far", "are not fitted"]
+    counts = re.findall(r"(\d+) of \d+ rows (?:dropped \()?(repeats|wrong|far|are not fitted)", printed)
+    assert [reason for _, reason in counts] == ["repeats", "wrong", "far", "are not fitted"]
     assert sum(int(count) for count, _ in counts) == given - used
 
 
@@ -466,8 +466,8 @@ def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
     assert main(["identify", "press.csv", "-o", "m.json", *arguments]) == 0
     printed = capsys.readouterr().out
     assert (
-        "rows                 154 of 455 rows repeat the previous reading and were dropped. 2 of 455 rows "
-        "are wrong readings and were dropped: row 205: 0 N at 1.342 mm, row 215: 200 N at 1.611 mm. "
+        "rows                 154 of 455 rows dropped (repeats of the previous reading). 2 of 455 rows "
+        "dropped (wrong readings): row 205: 0 N at 1.342 mm, row 215: 200 N at 1.611 mm. "
         "2 of 299 rows are not fitted: 2 wait in air\n"
     ) in printed
     assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n" in printed

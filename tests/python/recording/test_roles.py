@@ -73,7 +73,7 @@ def test_an_approach_does_not_change_the_model(rows: int, travels: float) -> Non
     assert model.verdict.level == "good"
     at = np.linspace(0.0, 4.0, 200)
     assert np.abs(model.force(at) - near.force(at)).max() < 0.05
-    assert "rows are far from the contact and were dropped" in str(model.notes["rows"])
+    assert "rows dropped (far from the contact)" in str(model.notes["rows"])
     assert "compared, fewer than" not in str(palpate.verify(model, far).verdict)
 
 

@@ -47,8 +47,7 @@ def test_position_spikes_are_left_out_and_counted(at: dict[int, float]) -> None:
     assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.01)
     assert model.domain[1][0] == pytest.approx(TRAVEL, rel=1e-3)
     (note,) = (each for each in model.notes["rows"] if "wrong readings" in each)
-    assert note.startswith(f"{len(at)} of {N} rows")
-    assert "were dropped" in note
+    assert note.startswith(f"{len(at)} of {N} rows dropped (wrong readings)")
 
 
 def test_force_spikes_are_left_out_and_counted() -> None:
@@ -56,7 +55,7 @@ def test_force_spikes_are_left_out_and_counted() -> None:
     y = wall(x) + noise(N)
     model = palpate.identify(recorded(x, changed(y, {5100: 1.4e7, 100: -1e9, 999: 500.0})))
     assert true_nrmse(model, wall) < 0.001
-    assert any(f"3 of {N} rows are wrong readings" in each for each in model.notes["rows"])
+    assert any(f"3 of {N} rows dropped (wrong readings)" in each for each in model.notes["rows"])
     assert any("row 100: -1e+09 at " in each for each in model.notes["rows"])
 
 
@@ -176,7 +175,7 @@ def test_wrong_reading_of_a_further_input_is_dropped() -> None:
     found = Informative([recording])
     (kept,), (note,) = found.recordings, found.notes
     assert len(kept) == N - 2
-    assert note.startswith(f"2 of {N} rows are wrong readings")
+    assert note.startswith(f"2 of {N} rows dropped (wrong readings)")
 
 
 @pytest.mark.parametrize("column", ["position_rad", "torque_Nm"])
@@ -221,7 +220,7 @@ def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> 
     assert float(np.abs(model.force(x, direction=press) - clean.force(x, direction=press)).max()) < 0.1
     (note,) = [note for note in model.notes["rows"] if "wrong readings" in note]
     row, force = next(iter(at.items()))
-    assert note.startswith(f"{len(at)} of 800 rows are wrong readings and were dropped")
+    assert note.startswith(f"{len(at)} of 800 rows dropped (wrong readings)")
     assert f": row {row}: {force:g} at " in note
 
 
@@ -278,8 +277,8 @@ def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
     kept, notes = found.recordings, found.notes
     assert [len(part) for part in kept] == [639, 159]
     assert [note.split(": ", 2)[:2] for note in notes] == [
-        ["recording 1", "1 of 640 rows are wrong readings and were dropped"],
-        ["recording 2", "1 of 160 rows are wrong readings and were dropped"],
+        ["recording 1", "1 of 640 rows dropped (wrong readings)"],
+        ["recording 2", "1 of 160 rows dropped (wrong readings)"],
     ]
     assert ["row 80:" in notes[0], "row 20:" in notes[1]] == [True, True]
 
@@ -292,7 +291,7 @@ def test_a_wrong_reading_on_a_steep_part_is_found_with_the_model() -> None:
     assert wrong_rows(x, y) == [250]
     model = palpate.identify(x, y)
     (note,) = (each for each in model.notes["rows"] if "wrong reading" in each)
-    assert note.startswith("2 of 400 rows are wrong readings and were dropped: row 150: ")
+    assert note.startswith("2 of 400 rows dropped (wrong readings): row 150: ")
     assert ", row 250: 1020 at " in note
     assert model.notes["roles"]["wrong reading"] == 2
     assert model.fit.nrmse < 1e-3

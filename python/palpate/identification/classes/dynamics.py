@@ -15,7 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
-from ...recording.motion import FORCE_RESOLUTION, LowPass, Piece, at_rows, long_enough, quiet_low_pass
+from ...recording.motion import (
+    FORCE_RESOLUTION,
+    LEAST_SPEED_SPREAD,
+    LowPass,
+    Piece,
+    at_rows,
+    long_enough,
+    quiet_low_pass,
+    spread_of_speeds,
+)
+from ..data.limits import evenly_spread
 from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
 from ..log import Decision, decided, lowered, squared_error_change
@@ -107,10 +117,6 @@ low-pass filter [-]: more samples would be nearly equal."""
 LEAST_INDEPENDENT_SAMPLES = 40.0
 """Least number of independent samples for a decision on damping and mass; each wavelet needs two more."""
 
-LEAST_SPEED_SPREAD = 0.19
-"""Least standard deviation of the speed along the motion divided by the mean speed [-]: that of speeds spread
-evenly from 1 to 2. With a smaller spread damping cannot be distinguished from friction."""
-
 SHORT_MOTION = "the motion of the recording between gaps of time is too short or too noisy"
 """Text of the decision that damping and mass are not tested, if the recorded motion is too short or too
 noisy."""
@@ -120,10 +126,6 @@ LEAST_SHARE = 1e-9
 
 SMOOTHING_SPEED_SHARE = 0.1
 """Speed v0 of the smoothed sign tanh(v/v0) of a velocity v [share of the RMS speed]."""
-
-MOST_ROWS = 20_000
-"""Largest number of rows from which the share of a residual that velocity explains is computed; of more rows
-an evenly spread part is used."""
 
 
 class Dynamics:
@@ -164,7 +166,8 @@ class Dynamics:
             return {}, [Decision(name, "not tested", SHORT_MOTION) for name in TERMS]
         decisions: list[Decision] = []
         allowed: tuple[str, ...] = TERMS
-        if (spread := self._spread_of_speeds()) < LEAST_SPEED_SPREAD:
+        spread = spread_of_speeds(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
+        if spread < LEAST_SPEED_SPREAD:
             reason = (
                 f"the speed was nearly constant: it varies by {100 * spread:.2g} %, slow and "
                 f"fast strokes with at least {100 * LEAST_SPEED_SPREAD:.2g} % are needed"
@@ -243,7 +246,7 @@ class Dynamics:
         and the share is corrected for the number of functions.
         """
         velocity, known = self.velocity()
-        rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
+        rows = evenly_spread(np.flatnonzero(known))
         v, r, x = velocity[rows, None], residual[rows], self._data.box[rows]
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
@@ -258,13 +261,6 @@ class Dynamics:
         if not friction:
             return share
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
-
-    def _spread_of_speeds(self) -> float:
-        """Returns the standard deviation of the speed divided by its mean, both averaged over the distance
-        moved, so that pauses and reversals have little weight."""
-        speed = np.abs(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
-        first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
-        return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))
 
     def _regression(self, basis: Basis, strokes: HysteresisInput | None) -> FoldedRegression | None:
         tables, folds = [], []

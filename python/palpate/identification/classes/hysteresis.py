@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
-from ..data.strokes import FAR, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
+from ..data.limits import evenly_spread
+from ..data.strokes import FAR, LEAST_KNOWN_SHARE, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
 from ..log import Decision, shifted_strokes
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
@@ -35,9 +36,6 @@ second time."""
 MOST_RADIUS_SEARCHES = 6
 """Largest number of searches of the play radius."""
 
-LEAST_KNOWN_SHARE = 0.5
-"""A play radius is tried only if at least this share of the rows has a known direction state with it [-]."""
-
 RADIUS_TOLERANCE = 1e-3
 """Relative error of the play radius at which the search of the play radius ends [-]."""
 
@@ -47,9 +45,6 @@ ratio [-]."""
 
 REWEIGHTINGS = 5
 """Number of fits of given wavelets, each with the weights that follow from the fit before."""
-
-MOST_ROWS = 100_000
-"""Largest number of rows for the comparison of two play radii; of more rows an evenly spread part is used."""
 
 
 class Hysteresis(ModelClass):
@@ -353,8 +348,7 @@ class PlaySearch:
         return problem.total(problem.solve(basis).rss)
 
     def _thinned(self, strokes: HysteresisInput) -> NDArray[np.bool_]:
-        """Selects at most MOST_ROWS of the fitted rows (n,) with known direction state, evenly spread."""
-        rows = np.flatnonzero(self._samples.data.fitted)
+        """Selects evenly spread rows (n,) of the fitted rows with known direction state."""
         thin = np.zeros(len(strokes.known), dtype=bool)
-        thin[rows[:: max(1, -(-len(rows) // MOST_ROWS))]] = True
+        thin[evenly_spread(np.flatnonzero(self._samples.data.fitted))] = True
         return np.asarray(thin & strokes.known)

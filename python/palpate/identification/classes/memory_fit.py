@@ -17,7 +17,8 @@ import scipy
 
 from ..._core.model import ForceModel, play, stretches
 from ..._typing import Float1D, Float2D
-from ..data.limits import independent_share
+from ..data.compression import HELD_OUT_EVERY
+from ..data.limits import LEAST_INDEPENDENT_SHARE, independent_share
 from ..search.evidence import CRITERIA
 
 MOST_ROUGHNESS = 1e-3
@@ -40,9 +41,6 @@ LEAST_RATIO = 0.02
 RATIO_POINTS = 201
 """Number of positions at which the least ratio is computed."""
 
-LEAST_INDEPENDENT_SHARE = 0.02
-"""Least share of the rows that count as independent [-]."""
-
 LEAST_INDEPENDENT = 30.0
 """Least number of rows that count as independent."""
 
@@ -52,9 +50,6 @@ SECTION_ROWS = 10
 UNDETERMINED = 0.03
 """Singular value, as a share of the largest one, below which rows do not determine a combination of
 coefficients [-]."""
-
-FOLDS = 5
-"""Number of times that the model is fitted without some sections."""
 
 
 @dataclass(frozen=True)
@@ -298,7 +293,9 @@ class MemoryFit:
         """
         columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
         columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
-        section = np.concatenate([np.arange(len(m.time)) // SECTION_ROWS % FOLDS for m in self.motions])
+        section = np.concatenate(
+            [np.arange(len(m.time)) // SECTION_ROWS % HELD_OUT_EVERY for m in self.motions]
+        )
         residual = self.error(shape)
         errors = []
         for fold in np.unique(section):

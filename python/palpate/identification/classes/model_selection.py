@@ -9,7 +9,8 @@ import numpy as np
 
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.limits import (
-    MOST_ORDERED_ROWS,
+    LEAST_INDEPENDENT_SHARE,
+    MOST_COMPARED_ROWS,
     correlation,
     independent_share,
     innovation_deviance,
@@ -25,10 +26,6 @@ from .repeatability import no_finer_than_repeats
 
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
-
-LEAST_INDEPENDENT_SHARE = 0.02
-"""Least share of the rows that count as independent if the noise of successive rows is correlated [-]. With a
-smaller share the residual is not noise but memory or drift."""
 
 SETTLED_INDEPENDENT_RATIO = 0.8
 """Ratio of the new to the previous share of independent rows, above which the model selection is not repeated
@@ -61,8 +58,8 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
     if data.counted is not None or first.options.criterion in ON_HELD_OUT_ROWS:
         return first
     count = len(data.force)
-    first_row = max(0, (count - MOST_ORDERED_ROWS) // 2)
-    rows = slice(first_row, first_row + MOST_ORDERED_ROWS)
+    first_row = max(0, (count - MOST_COMPARED_ROWS) // 2)
+    rows = slice(first_row, first_row + MOST_COMPARED_ROWS)
     used = np.ones(count, dtype=bool) if data.weight is None else data.weight > 0.0
     least = (FORCE_RESOLUTION * float(np.ptp(data.force))) ** 2 + np.finfo(float).tiny
     found = []
@@ -119,12 +116,7 @@ class MassAndDamping(ModelClass):
         if best is below:
             return below
         note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."
-        log, later = selection.log, current.log
-        log.path += later.path
-        log.decisions += later.decisions
-        log.rows += later.rows
-        log.notes += [note, *later.notes]
-        log.findings = later.findings
+        selection.log.follow(current.log, [note])
         return selection.recorded(best)
 
 
@@ -174,14 +166,13 @@ class Velocity(ModelClass):
         compared = "constant damping" if constant else in_words(below.model_class)
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
         bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
-        log.path += both.log.path
-        log.decisions.append(decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}"))
+        decision = decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}")
         if share < LEAST_GAIN:
+            log.path += both.log.path
+            log.decisions.append(decision)
             return below
-        over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.log.decisions]
-        log.rows += both.log.rows
-        log.notes += [*over_both_inputs, *both.log.notes]
-        log.findings += both.log.findings
+        over_both_inputs = [f"Over position and velocity: {each}." for each in both.log.decisions]
+        log.follow(replace(both.log, decisions=[decision]), over_both_inputs)
         return both.best
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
 from ...verdict import FORCE_FLOOR, force_jnd
-from .limits import NO_LIMITS, RowLimits, distinct_rows
+from .limits import NO_LIMITS, RowLimits, distinct_rows, evenly_spread
 
 SIDE_LEVELS = 16
 """Number of cell widths of the direction state over [-1, 1]. The first and the last cell have their centres
@@ -254,9 +254,6 @@ HELD_OUT_BLOCKS = 50
 """Number of sections of a recording, of which every fifth is held out as a whole: adjacent samples are
 correlated."""
 
-MOST_HELD_OUT_ROWS = 20_000
-"""Largest number of held-out rows; of more held-out rows an evenly spread part is used."""
-
 
 @dataclass(frozen=True)
 class HeldOutRows:
@@ -269,8 +266,7 @@ class HeldOutRows:
 
     @staticmethod
     def of(positions: Float2D, force: Float1D, side: Float1D | None, rows: NDArray[np.bool_]) -> HeldOutRows:
-        index = np.flatnonzero(rows)
-        index = index[:: max(1, -(-len(index) // MOST_HELD_OUT_ROWS))]
+        index = evenly_spread(np.flatnonzero(rows))
         return HeldOutRows(
             np.ascontiguousarray(positions[index]), force[index], None if side is None else side[index]
         )

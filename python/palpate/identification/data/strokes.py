@@ -21,6 +21,9 @@ from ..log import Decision, Log
 TRAVEL_CELLS = 32
 """Number of cells of the travel in which press force and release force are compared."""
 
+LEAST_KNOWN_SHARE = 0.5
+"""Hysteresis is tested only if the direction state of at least this share of the rows is known [-]."""
+
 LEAST_CONSISTENT_SHARE = 0.9
 """If the force of one recording is above that of another in at least this share of the position cells, the
 recording with the higher force is taken as press, the other one as release [-]."""

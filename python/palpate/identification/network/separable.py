@@ -20,6 +20,7 @@ never worse than the start.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -31,7 +32,7 @@ from ..._core.model import wavelet_steps
 from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.compression import Compressed, HeldOutRows
-from ..data.limits import NO_LIMITS, RowLimits, evenness
+from ..data.limits import NO_LIMITS, RowLimits, evenness, neighbour_correlation
 from .basis import Basis, Resolution
 
 RIDGE = 1e-11
@@ -247,20 +248,10 @@ class SeparableProblem:
         """Returns the evenness of the residuals of all blocks."""
         return evenness(np.concatenate(solution.residuals))
 
-    def neighbour_correlation(self, solution: Solution) -> float:
-        """Returns the correlation of residuals at neighbouring positions [standard errors]; 0 with several
-        inputs or channels."""
-        if self.dimension > 1 or self.n_channels > 1:
-            return 0.0
-        (residual,) = solution.residuals
-        correlation = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
-        return correlation * float(np.sqrt(len(residual)))
-
     def structured(self, solution: Solution) -> bool:
         """True if residuals at neighbouring rows of some block are correlated."""
         return any(
-            float(left[1:] @ left[:-1]) * float(np.sqrt(len(left)))
-            > SIGNIFICANT_CORRELATION * float(left @ left)
+            neighbour_correlation(left) * math.sqrt(len(left)) > SIGNIFICANT_CORRELATION
             for left in solution.residuals
         )
 

@@ -27,12 +27,8 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
-from ..data.compression import (
-    Compressed,
-    Compressor,
-    HeldOutRows,
-    around_seam,
-)
+from ..data.compression import Compressed, Compressor, HeldOutRows, around_seam
+from ..data.limits import evenly_spread
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
 from ..log import Log, PathPoint, decided, in_words, lowered
@@ -43,10 +39,6 @@ from ..options import IdentifyOptions
 LEAST_GAIN = 0.25
 """Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]:
 these forces are harder to render and to certify."""
-
-MOST_NOISE_ROWS = 50_000
-"""Largest number of rows from which the noise where two models differ is computed; of more rows an evenly
-spread part is used."""
 
 ALL_ROWS = slice(None)
 """Every row."""
@@ -403,8 +395,7 @@ def local_noise_ratio(below: Candidate, above: Candidate) -> float:
     all rows overestimates the evidence for structure by this ratio.
     """
     data = above.data
-    rows = np.flatnonzero(data.fitted)
-    rows = rows[:: max(1, len(rows) // MOST_NOISE_ROWS)]
+    rows = evenly_spread(np.flatnonzero(data.fitted))
     force = above.force_at(rows)
     weight = (force - below.force_at(rows)) ** 2
     if data.weight is not None:

@@ -20,7 +20,6 @@ from ..log import PathPoint
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.separable import (
     LEAST_DILATION,
-    SIGNIFICANT_CORRELATION,
     SeparableProblem,
     Solution,
     refine,
@@ -68,12 +67,9 @@ MOST_SMOOTH_ROWS = 1024
 """With more rows over several inputs, wide wavelets alone are not tried: the rows are near enough to each
 other to show a wrong force between them."""
 
-MOST_LIBRARY_ROWS = 8192
-"""Largest number of rows over several inputs on which candidate wavelets are compared. Of more rows a random
-part is used."""
-
 LEAST_PART_ROWS = 8192
-"""Least number of rows over several inputs on which a network grows before it grows on more rows."""
+"""Of more rows over several inputs a random part shows which candidate wavelet is the best, and a network
+grows on a part before it grows on all."""
 
 PART_SHARE = 0.25
 """Share of the rows over several inputs on which a network grows first [-]."""
@@ -183,7 +179,7 @@ class Growth:
         limits = problem.limits
         if limits.independent < 1.0 or problem.rmse(found.solution) <= FINER_ERROR_RATIO * limits.force_error:
             return found
-        correlated = problem.neighbour_correlation(found.solution) > SIGNIFICANT_CORRELATION
+        correlated = not several and problem.structured(found.solution)
         is_even = problem.evenness(found.solution) >= LEAST_NOISE_EVENNESS
         if problem.resolved_by <= LEAST_CORE_POSITIONS or (is_even and not correlated):
             return found
@@ -275,7 +271,7 @@ class Growth:
             part = problem.part(max(LEAST_PART_ROWS, int(PART_SHARE * rows)))
             grown_there = self._grown(part, start, model_class, most, wide=wide, in_parts=True)
             start, patience, wide = grown_there.solution.basis, search.patience, False
-        compared = problem if problem.dimension == 1 else problem.part(MOST_LIBRARY_ROWS)
+        compared = problem if problem.dimension == 1 else problem.part(LEAST_PART_ROWS)
         library = self.library(compared)
         problem = problem.with_prior(problem.solve(start).rss)
         problem, current = self._improved(problem, problem.solve(start), search.refine_steps)

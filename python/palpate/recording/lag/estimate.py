@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..motion import LEAST_SPEED_SPREAD, spread_of_speeds
 from .force_lag import LONGEST_LAG_S, LONGEST_LEAD_S, ForceLag, unknown
-from .motions import Motion, motions_of, spread_of_speeds
+from .motions import Motion, motions_of
 from .strokes import Strokes
 from .turns import lag_of_turns
 
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
 
 LARGEST_ERROR_S = 0.01
 """Largest half width of the confidence interval of a lag that counts as known [s]."""
-
-LEAST_SPEED_SPREAD = 0.19
-"""Least standard deviation of the speed along the motion divided by the mean speed [-], below which only the
-turns of a recording are used."""
 
 MOST_MOTION_ROWS = 100_000
 """Largest number of rows of motions that are used; later motions are left out."""
@@ -51,9 +48,8 @@ def lag_of(recordings: Sequence[Recording]) -> ForceLag:
     )
     if not (np.ptp(position) > 0.0 and np.ptp(force) > 0.0):
         return unknown("position or force is constant")
-    if spread_of_speeds(parts) >= LEAST_SPEED_SPREAD:
-        return _checked(Strokes.of(parts))
-    return _checked(lag_of_turns(parts))
+    one_speed = spread_of_speeds(np.concatenate([part.velocity for part in parts])) < LEAST_SPEED_SPREAD
+    return _checked(lag_of_turns(parts) if one_speed else Strokes.of(parts))
 
 
 def _checked(found: ForceLag) -> ForceLag:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -144,11 +143,3 @@ def motions_of(recording: Recording, most: int) -> list[Motion]:
         if len(rows) > 2 * TURN_ROWS:
             found.append(Motion(t, position[start:stop], rows, force[start:stop]))
     return found
-
-
-def spread_of_speeds(parts: Sequence[Motion]) -> float:
-    """Returns the standard deviation of the speed divided by its mean, both averaged over the distance moved,
-    so that pauses and turns have little weight."""
-    speed = np.abs(np.concatenate([part.velocity for part in parts]))
-    first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
-    return math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0

@@ -102,7 +102,7 @@ def test_rows_without_direction_are_dropped_and_counted() -> None:
     network = fit_environment(x[:, None], y, side)
     assert network.model_class == "hysteresis"
     assert network.rmse < 0.03
-    assert "30 rows without a direction are not used to test hysteresis." in network.log.rows
+    assert "30 rows without a direction are not fitted." in network.log.rows
 
 
 def test_rows_without_direction_are_used_if_hysteresis_is_not_accepted() -> None:

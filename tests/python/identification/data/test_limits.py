@@ -147,7 +147,7 @@ def test_repeated_rows_change_neither_model_nor_verdict(times: int) -> None:
     assert np.array_equal(model.weight, once.weight)
     assert (model.verdict, again.verdict) == (once.verdict, once.verdict)
     assert model.notes["roles"]["repeated"] == 800 * (times - 1)
-    assert f"{800 * (times - 1)} of {800 * times} rows repeat" in model.notes["rows"][0]
+    assert f"{800 * (times - 1)} of {800 * times} rows dropped (repeats" in model.notes["rows"][0]
 
 
 @pytest.mark.full
