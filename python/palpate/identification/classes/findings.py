@@ -16,7 +16,7 @@ from ...recording.checks import findings_of
 from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
-from ..data.limits import independent_share, neighbour_correlation
+from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..log import Log, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
@@ -234,7 +234,7 @@ def drift_findings(best: Candidate) -> list[Finding]:
         return []
     change = float((weight * moment) @ residual) / squares
     noise = residual - change * moment
-    independent = max(1.0, len(rows) * independent_share(max(neighbour_correlation(noise), 0.0)))
+    independent = max(1.0, len(rows) * (1.0 - max(neighbour_correlation(noise), 0.0)))
     error = float(np.sqrt(weight @ noise**2 / squares / independent))
     excess, least = abs(change) - PLACE_ERRORS * error, _floor(best)
     if excess <= least:
@@ -353,7 +353,9 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         share=share,
         left_out_nrmse=replace(error, residual=left_out).nrmse,
         residuals=int(np.count_nonzero(counted)),
-        residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
+        residual_correlation=neighbour_correlation(
+            best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]
+        ),
         band=band,
         log=Log(
             log.path,

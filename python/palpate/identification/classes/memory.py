@@ -7,19 +7,22 @@ after each. Then the force at rest is identified as any force of position.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order
 from ...recording.roles import Role, roles_of
-from ...verdict import Finding, usable
+from ...verdict import FORCE_FLOOR, Finding, usable
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
@@ -167,26 +170,38 @@ class Recorded:
     lower: float
     travel: float
     spread: float
-    contact: bool
-    """True if the tool can leave the object"""
+    near_zero: float
+    """Largest |force| without contact [force]; below 0 if the tool cannot leave the object"""
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], found: FittedNetwork) -> Recorded:
+    def of(cls, recordings: Sequence[Recording], found: FittedNetwork, options: IdentifyOptions) -> Recorded:
         force = np.concatenate([part.force for part in recordings])
-        position = np.concatenate([part.position for part in recordings])
+        near_zero = options.search.contact_share * float(np.ptp(force)) if found.below == "free" else -1.0
+        position = np.concatenate([part.position for part in recordings])[np.abs(force) > near_zero]
         lower, travel = float(position.min()), float(np.ptp(position))
-        return cls(recordings, lower, travel, float(np.std(force)), found.below == "free")
+        return cls(recordings, lower, travel, float(np.std(force)), near_zero)
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
         """Rows of the recordings; of many rows an evenly spread part."""
-        step = max(1, -(-sum(map(len, self.recordings)) // MOST_ROWS))
-        return tuple(self._motion(part, step) for part in self.recordings)
+        return tuple(self._motion(part) for part in self.recordings)
 
-    def _motion(self, part: Recording, step: int) -> Motion:
-        time, position, force = part.time_or_row[::step], part.position[::step], part.force[::step]
+    @cached_property
+    def every(self) -> slice:
+        """Rows of each recording that are used."""
+        return slice(None, None, max(1, -(-sum(map(len, self.recordings)) // MOST_ROWS)))
+
+    def fitted(self, values: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Returns the values at the fitted rows, from those at all rows of each recording."""
+        used = [each[self.every][m.touched] for each, m in zip(values, self.motions, strict=True)]
+        return np.concatenate(used)
+
+    def _motion(self, part: Recording) -> Motion:
+        time, position, force = (
+            values[self.every] for values in (part.time_or_row, part.position, part.force)
+        )
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
-        return Motion(time, box, force / self.spread)
+        return Motion(time, box, force / self.spread, np.abs(force) > self.near_zero)
 
     @cached_property
     def ranges(self) -> Ranges:
@@ -273,7 +288,8 @@ def untested(
         return ""
     if "velocity" in found.inputs:
         return _unsupported(options)
-    if (nrmse := found.settled_nrmse[0]) < LEAST_NRMSE:
+    spread = found.rmse / found.nrmse if found.nrmse else math.inf
+    if (nrmse := found.rmse_of_all / spread) < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
     every_second = 2 * found.residuals >= fitted_rows
     upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
@@ -313,11 +329,12 @@ def better_with_memory(
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
         return replace(found, log=found.log + Log(decisions=[decision])) if reason else found
-    recorded = Recorded.of(recordings, found)
+    recorded = Recorded.of(recordings, found, options)
     choice = grown(recorded, options)
     if choice.shape is None:
         return _refused(found, "no branch lowers the criterion")
-    before = (found.rmse_of_all / recorded.spread) ** 2
+    compared = _Compared.of(found, recorded)
+    before = (compared.rmse / recorded.spread) ** 2
     in_sample = 1.0 - choice.rms() ** 2 / before
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
@@ -347,29 +364,19 @@ def better_with_memory(
         linear=recorded.spread / recorded.travel * coefficients[-2:-1],
         bias=recorded.spread * float(coefficients[-1] - coefficients[-2] * recorded.lower / recorded.travel),
         memory=recorded.memory(refined, stiffness),
-        below="free" if recorded.contact else "linear",
+        below="linear" if recorded.near_zero < 0.0 else "free",
     )
-    weights = (
-        found.share if found.share is not None and len(found.share) == sum(map(len, recordings)) else None
-    )
-    (error, settled, of_motion), findings = (
-        _errors(network, recordings, weights),
-        list(_undetermined(found, recordings)),
-    )
-    linear = replace(network, below="linear")
-    others = _errors(linear, recordings, weights)
-    if recorded.contact and options.below == "auto" and others[0] < error:
-        findings.append(_pulls(recordings[0], recorded, others[0], error))
-        network, (error, settled, of_motion) = linear, others
-    if of_motion**2 > (1.0 + LEAST_GAIN) * found.settled_rmse**2:
-        # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that is
-        # wrong while the tool moves.
-        change = recordings[0].file_unit("force").interval(found.settled_rmse, of_motion)
+    residual = recorded.spread * fit.error(refined)
+    of_motion = _rms(residual, compared.moving)
+    felt = FORCE_FLOOR * max(float(np.abs(part.force).max()) for part in recordings)
+    if of_motion**2 > max((1.0 + LEAST_GAIN) * compared.rmse_of_motion**2, felt**2):
+        # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that a
+        # hand feels to be wrong while the tool moves.
+        change = recordings[0].file_unit("force").interval(compared.rmse_of_motion, of_motion)
         return _refused(found, f"it raises the RMS error while the tool moves from {change}")
-    nrmse, settled_nrmse = error / recorded.spread, settled / recorded.spread
     held_out = fit.held_out_errors(refined)
     left_out_nrmse = float(np.sqrt(held_out.mean()))
-    gain = 1.0 - max(settled_nrmse, left_out_nrmse) ** 2 / before
+    gain = 1.0 - max(_rms(residual, compared.weight) / recorded.spread, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
     n_parameters = network.n_parameters + refined.n_parameters
     text = _gain_text(gain, scatter)
@@ -384,15 +391,17 @@ def better_with_memory(
     if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
+    error = _rmse(network, recordings)
+    nrmse = error / recorded.spread
     return replace(
         network,
         model_class="memory",
         n_parameters=n_parameters,
         rmse=error,
         nrmse=nrmse,
-        rmse_of_all=settled,
-        settled_rmse=settled,
-        settled_nrmse=(settled_nrmse, left_out_nrmse),
+        rmse_of_all=error,
+        settled_rmse=error,
+        settled_nrmse=(nrmse, left_out_nrmse),
         left_out_nrmse=left_out_nrmse,
         residuals=fit.n_rows,
         log=Log(
@@ -400,7 +409,7 @@ def better_with_memory(
             [*found.log.decisions, decision],
             found.log.rows,
             [*found.log.notes, *_branches(recorded, refined)],
-            findings,
+            list(_undetermined(found, recordings)),
         ),
     )
 
@@ -419,17 +428,6 @@ def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
         position = recorded.recordings[0].file_unit("position")
         found = ", ".join(position.text(recorded.travel * most) for most in np.sort(np.exp(shape.log_yield)))
         yield f"The loops grow with the distance moved: the branches slip from stretches of {found} on."
-
-
-def _pulls(recording: Recording, recorded: Recorded, linear: float, free: float) -> Finding:
-    """Returns the finding that the model pulls the tool where the object does not. `linear` and `free` are
-    the RMS errors of both continuations."""
-    position, force = recording.file_unit("position"), recording.file_unit("force")
-    return usable(
-        f"below {position.text(recorded.lower)} the model pulls the tool, which no row shows; do not retract "
-        f"further. With --below free it does not pull, and the RMS error is {force.text(free)} in place of "
-        f"{force.text(linear)}"
-    )
 
 
 def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iterator[Finding]:
@@ -458,23 +456,43 @@ IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
 the sum of their squared errors, and the largest number of wavelets"""
 
 
-def _errors(
-    network: FittedNetwork, recordings: Sequence[Recording], weights: Float1D | None
-) -> tuple[float, float, float]:
-    """Returns the RMS error of a model with memory on all rows of recordings, the same with weights (n,) of
-    all rows, and that of the rows at which the tool moves with these weights [force]."""
+@dataclass(frozen=True)
+class _Compared:
+    """Weights of the rows on which a memory is compared with the model without it, and the errors of the
+    latter on them."""
+
+    weight: Float1D
+    """(n,) weight in the fit of a row behind a turn, else 1"""
+    moving: Float1D
+    """(n,) 1 while the tool moves: a memory needs no smaller weights behind a turn"""
+    rmse: float
+    """[force]"""
+    rmse_of_motion: float
+    """With the weights of the fit [force]"""
+
+    @classmethod
+    def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
+        parts = recorded.recordings
+        moving = recorded.fitted([roles_of(part) == Role.MOVING for part in parts]).astype(float)
+        ends = np.cumsum([len(part) for part in parts])
+        if found.residual is None or found.share is None or len(found.residual) != ends[-1]:
+            # some rows have no residual, such as those at gaps of time
+            return cls(np.ones(len(moving)), moving, found.rmse_of_all, found.settled_rmse)
+        residual, share = (
+            recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
+        )
+        return cls(share, moving, _rms(residual, share), _rms(residual, share * moving))
+
+
+def _rms(residual: Float1D, weight: Float1D) -> float:
+    return float(np.sqrt(np.average(residual**2, weights=weight)))
+
+
+def _rmse(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
+    """Returns the RMS error of a model with memory on all rows of recordings [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
     )
-    squares, moving = [], []
-    for part in recordings:
-        squares.append((model.force_over_time(part.time_or_row, part.position)[0] - part.force) ** 2)
-        moving.append(roles_of(part) == Role.MOVING)
-    square = np.concatenate(squares)
-    share = np.ones(len(square)) if weights is None else weights
-    of_all, settled, of_motion = (
-        float(np.sqrt(np.average(square, weights=each)))
-        for each in (np.ones(len(square)), share, share * np.concatenate(moving))
-    )
-    return of_all, settled, of_motion
+    errors = [model.force_over_time(part.time_or_row, part.position)[0] - part.force for part in recordings]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ..._core.model import ForceModel, play, stretches
 from ..._typing import Float1D, Float2D
@@ -59,6 +60,8 @@ class Motion:
     time: Float1D
     position: Float1D
     force: Float1D
+    touched: NDArray[np.bool_]
+    """(n,) True for the rows that are fitted: without contact the force is zero in any state of the object"""
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,7 @@ Resting = Callable[[Float1D], Float2D]
 
 
 class MemoryFit:
-    """Least-squares fits of memories to motions, with fixed columns for the force at rest.
+    """Least-squares fits of memories to rows in contact, with fixed columns for the force at rest.
 
     Parameters
     ----------
@@ -188,8 +191,8 @@ class MemoryFit:
         self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
     ) -> None:
         self.motions, self.least = motions, least
-        columns = np.concatenate([resting(m.position) for m in motions])
-        self._force = np.concatenate([m.force for m in motions])
+        columns = np.concatenate([resting(m.position[m.touched]) for m in motions])
+        self._force = np.concatenate([m.force[m.touched] for m in motions])
         self.n_rows = len(self._force)
         bends = (
             np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
@@ -222,7 +225,8 @@ class MemoryFit:
                     for most in np.exp(shape.log_yield)
                 ),
             ]
-            parts.append(np.asarray(ratio.force(motion.position))[:, None] * np.column_stack(found))
+            force = np.asarray(ratio.force(motion.position))[:, None] * np.column_stack(found)
+            parts.append(force[motion.touched])
         return np.concatenate(parts)
 
     def residual(self, shape: Shape) -> Float1D:
@@ -294,7 +298,7 @@ class MemoryFit:
         columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
         columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
         section = np.concatenate(
-            [np.arange(len(m.time)) // SECTION_ROWS % HELD_OUT_EVERY for m in self.motions]
+            [(np.arange(len(m.time)) // SECTION_ROWS % HELD_OUT_EVERY)[m.touched] for m in self.motions]
         )
         residual = self.error(shape)
         errors = []
