@@ -462,13 +462,13 @@ class _Compared:
     latter on them."""
 
     weight: Float1D
-    """(n,) weight in the fit of a row behind a turn, else 1"""
+    """(n,) weight in the fit of a row behind a turn, 1 of the others"""
     moving: Float1D
-    """(n,) 1 while the tool moves: a memory needs no smaller weights behind a turn"""
+    """(n,) the same, and 0 where the tool waits"""
     rmse: float
     """[force]"""
     rmse_of_motion: float
-    """With the weights of the fit [force]"""
+    """[force]"""
 
     @classmethod
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
@@ -481,7 +481,7 @@ class _Compared:
         residual, share = (
             recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
         )
-        return cls(share, moving, _rms(residual, share), _rms(residual, share * moving))
+        return cls(share, share * moving, _rms(residual, share), _rms(residual, share * moving))
 
 
 def _rms(residual: Float1D, weight: Float1D) -> float:
