@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
+from ...recording.contact import contact_at
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order
 from ...recording.roles import Role, roles_of
-from ...verdict import FORCE_FLOOR, Finding, usable
+from ...verdict import Finding, usable
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, deviance
+from .findings import USABLE_NRMSE
 from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
@@ -176,10 +178,12 @@ class Recorded:
     @classmethod
     def of(cls, recordings: Sequence[Recording], found: FittedNetwork, options: IdentifyOptions) -> Recorded:
         force = np.concatenate([part.force for part in recordings])
-        near_zero = options.search.contact_share * float(np.ptp(force)) if found.below == "free" else -1.0
-        position = np.concatenate([part.position for part in recordings])[np.abs(force) > near_zero]
-        lower, travel = float(position.min()), float(np.ptp(position))
-        return cls(recordings, lower, travel, float(np.std(force)), near_zero)
+        near_zero = options.search.contact_share * float(np.ptp(force))
+        if found.below != "free" or (options.below == "auto" and force.min() < -near_zero):
+            near_zero = -1.0  # some rows are pulled
+        position = np.concatenate([part.position for part in recordings])
+        lower = float(position.min()) if near_zero < 0.0 else contact_at(position, force)
+        return cls(recordings, lower, float(position.max()) - lower, float(np.std(force)), near_zero)
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
@@ -201,7 +205,9 @@ class Recorded:
             values[self.every] for values in (part.time_or_row, part.position, part.force)
         )
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
-        return Motion(time, box, force / self.spread, np.abs(force) > self.near_zero)
+        touched = np.abs(force) > self.near_zero
+        touched[: np.argmax(touched)] = True  # before its first contact the object is at rest
+        return Motion(time, box, force / self.spread, touched)
 
     @cached_property
     def ranges(self) -> Ranges:
@@ -367,16 +373,17 @@ def better_with_memory(
         below="linear" if recorded.near_zero < 0.0 else "free",
     )
     residual = recorded.spread * fit.error(refined)
-    of_motion = _rms(residual, compared.moving)
-    felt = FORCE_FLOOR * max(float(np.abs(part.force).max()) for part in recordings)
-    if of_motion**2 > max((1.0 + LEAST_GAIN) * compared.rmse_of_motion**2, felt**2):
-        # Friction creeps in a pause, and reverses behind a turn. Such rows alone would accept a model that a
-        # hand feels to be wrong while the tool moves.
-        change = recordings[0].file_unit("force").interval(compared.rmse_of_motion, of_motion)
-        return _refused(found, f"it raises the RMS error while the tool moves from {change}")
+    error, where_sure = _rms(residual, compared.weight), _rms(residual, compared.sure)
+    if where_sure**2 > (1.0 + LEAST_GAIN) * compared.rmse_where_sure**2:
+        # The pauses of friction that creeps would accept a model that is wrong while the tool moves.
+        change = recordings[0].file_unit("force").interval(compared.rmse_where_sure, where_sure)
+        return _refused(
+            found,
+            f"if the force creeps between press and release in pauses, it raises the RMS error from {change}",
+        )
     held_out = fit.held_out_errors(refined)
     left_out_nrmse = float(np.sqrt(held_out.mean()))
-    gain = 1.0 - max(_rms(residual, compared.weight) / recorded.spread, left_out_nrmse) ** 2 / before
+    gain = 1.0 - max(error / recorded.spread, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
     n_parameters = network.n_parameters + refined.n_parameters
     text = _gain_text(gain, scatter)
@@ -391,16 +398,16 @@ def better_with_memory(
     if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
-    error = _rmse(network, recordings)
-    nrmse = error / recorded.spread
+    of_all = _rmse(network, recordings)
+    nrmse = of_all / recorded.spread
     return replace(
         network,
         model_class="memory",
         n_parameters=n_parameters,
-        rmse=error,
+        rmse=of_all,
         nrmse=nrmse,
-        rmse_of_all=error,
-        settled_rmse=error,
+        rmse_of_all=of_all,
+        settled_rmse=of_all,
         settled_nrmse=(nrmse, left_out_nrmse),
         left_out_nrmse=left_out_nrmse,
         residuals=fit.n_rows,
@@ -409,7 +416,7 @@ def better_with_memory(
             [*found.log.decisions, decision],
             found.log.rows,
             [*found.log.notes, *_branches(recorded, refined)],
-            list(_undetermined(found, recordings)),
+            [*_undetermined(found, recordings), *_forgotten(network, recordings[0], of_all, error)],
         ),
     )
 
@@ -442,6 +449,21 @@ def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iter
             )
 
 
+def _forgotten(
+    network: FittedNetwork, recording: Recording, of_all: float, in_contact: float
+) -> Iterator[Finding]:
+    """Yields a finding if the model is good in contact only: where the tool leaves the object, the branches
+    are released, because a branch that stays stretched would pull the tool. The errors are RMS errors."""
+    good = USABLE_NRMSE * float(np.std(recording.force))
+    if network.below == "free" and in_contact <= good < of_all:
+        force = recording.file_unit("force")
+        yield usable(
+            "where the tool leaves the object and returns, the model forgets how far the object had relaxed: "
+            f"the RMS error is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in "
+            "contact, or give --below linear, with which the model remembers but pulls the tool"
+        )
+
+
 def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
     return replace(found, log=found.log + Log(decisions=[decided("memory", False, reason)]))
 
@@ -458,34 +480,40 @@ the sum of their squared errors, and the largest number of wavelets"""
 
 @dataclass(frozen=True)
 class _Compared:
-    """Weights of the rows on which a memory is compared with the model without it, and the errors of the
-    latter on them."""
+    """Rows on which a memory is compared with the model without it, and the errors of the latter."""
 
     weight: Float1D
     """(n,) weight in the fit of a row behind a turn, 1 of the others"""
-    moving: Float1D
-    """(n,) the same, and 0 where the tool waits"""
+    sure: Float1D
+    """(n,) the same, and 0 without force and for a wait between press and release, where friction may
+    creep"""
     rmse: float
     """[force]"""
-    rmse_of_motion: float
+    rmse_where_sure: float
     """[force]"""
 
     @classmethod
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
         parts = recorded.recordings
-        moving = recorded.fitted([roles_of(part) == Role.MOVING for part in parts]).astype(float)
         ends = np.cumsum([len(part) for part in parts])
         if found.residual is None or found.share is None or len(found.residual) != ends[-1]:
             # some rows have no residual, such as those at gaps of time
-            return cls(np.ones(len(moving)), moving, found.rmse_of_all, found.settled_rmse)
+            return cls(np.array(1.0), np.array(1.0), found.rmse_of_all, found.settled_rmse)
         residual, share = (
             recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
         )
-        return cls(share, share * moving, _rms(residual, share), _rms(residual, share * moving))
+        force, position = (
+            recorded.fitted([getattr(part, name) for part in parts]) for name in ("force", "position")
+        )
+        strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
+        outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
+        moving = recorded.fitted([roles_of(part) == Role.MOVING for part in parts])
+        sure = share * (moving | (outside != 0.0)) * (np.abs(force) > recorded.near_zero)
+        return cls(share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure))
 
 
 def _rms(residual: Float1D, weight: Float1D) -> float:
-    return float(np.sqrt(np.average(residual**2, weights=weight)))
+    return float(np.sqrt(np.average(residual**2, weights=np.broadcast_to(weight, residual.shape))))
 
 
 def _rmse(network: FittedNetwork, recordings: Sequence[Recording]) -> float:

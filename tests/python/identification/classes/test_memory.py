@@ -208,26 +208,51 @@ def test_small_forces_and_offsets_do_not_change_the_branches() -> None:
     assert not any("left out of the fit" in note for note in model.notes["identification"])
 
 
-@pytest.mark.full
-def test_a_tissue_that_a_hand_presses_and_leaves_gets_a_memory() -> None:
-    """The force is zero in air, and the tissue relaxes there as well."""
-    time = 0.01 * np.arange(2000)
-    speed = 1.0 + 0.4 * np.sin(0.5 * time)
-    depth = 0.48 - 0.52 * np.cos(2.0 * np.pi * 0.5 * 0.01 * np.cumsum(speed))
+def tissue(time: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Returns the force of a tissue that relaxes within 0.8 s and only pushes."""
     pressed = np.maximum(depth, 0.0)
     elastic = pressed + 1.5 * pressed**2
     relaxing = stretches(time, elastic[:, None], np.array([0.8]))[:, 0, 0]
-    force = np.where(depth > 0.0, np.maximum(elastic + 0.6 * relaxing, 0.0), 0.0)
-    model = palpate.identify(depth, with_noise(force, 0.005), time=time)
+    return np.asarray(np.where(depth > 0.0, np.maximum(elastic + 0.6 * relaxing, 0.0), 0.0))
+
+
+@pytest.mark.parametrize("hold_s", sampled([0.5, 2.0], 2.0))
+def test_a_tissue_under_holds_gets_a_memory_and_never_pulls(hold_s: float) -> None:
+    """Hysteresis fits the rows of the motion, but its loop is twice as wide as without the holds."""
+    rate, speed = 200.0, 1.0
+    places = np.array([-0.05, 0.5, 1.0, 0.5, -0.05])
+    knots, at = [0.0], [places[0]]
+    for place, hold in zip(places[1:], (hold_s, hold_s, hold_s, 0.2), strict=True):
+        arrived = knots[-1] + abs(place - at[-1]) / speed
+        knots, at = [*knots, arrived, arrived + hold], [*at, place, place]
+    time = np.arange(0.0, knots[-1], 1.0 / rate)
+    depth = np.interp(time, knots, at)
+    model = palpate.identify(depth, with_noise(tissue(time, depth), 0.01), time=time)
     assert model.memory is not None
-    assert model.fit.nrmse < 0.05
-    # A force that ends where the tool leaves would forget its branches there.
-    assert model.verdict.level == "usable"
-    assert "the model pulls the tool, which no row shows" in str(model.verdict)
-    assert len(model.verdict.reasons) == 1
-    free = palpate.identify(depth, with_noise(force, 0.005), time=time, below="free")
-    assert free.below == "free"
-    assert "pulls" not in str(free.verdict)
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.8], rtol=0.15)
+    assert model.verdict.level == "good"
+    # a fresh stroke without holds
+    time = np.arange(0.0, 2.1, 1.0 / rate)
+    depth = np.interp(time, [0.0, 1.05, 2.1], [-0.05, 1.0, -0.05])
+    force, found = tissue(time, depth), model.force_over_time(time, depth)[0]
+    assert np.sqrt(np.mean((found - force) ** 2)) < 0.05 * force.std()
+    assert np.asarray(found).min() >= 0.0
+
+
+def test_a_memory_that_forgets_while_the_tool_is_away_states_it() -> None:
+    time = 0.01 * np.arange(2000)
+    speed = 1.0 + 0.4 * np.sin(0.5 * time)
+    depth = 0.48 - 0.52 * np.cos(2.0 * np.pi * 0.5 * 0.01 * np.cumsum(speed))
+    force = with_noise(tissue(time, depth), 0.005)
+    model = palpate.identify(depth, force, time=time)
+    assert model.memory is not None
+    assert model.below == "free"
+    assert model.fit.nrmse > 0.1
+    assert "returns, the model forgets how far the object had relaxed" in model.verdict.reasons[0]
+    assert "--below linear" in model.verdict.reasons[0]
+    remembers = palpate.identify(depth, force, time=time, below="linear")
+    assert remembers.memory is not None
+    assert remembers.fit.nrmse < 0.05
 
 
 @pytest.mark.full
