@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...verdict import Finding, no, usable
+from ..motion import waits
 from ..units import GRAVITY
 from .cells import sides
 
@@ -86,10 +87,19 @@ class _Strokes:
         `side` (n,) is the direction of the rows; with None the result of :func:`sides` is used.
         """
         signs = sides(recording) if side is None else side
-        into, out = signs > 0, signs < 0
+        moving = _moving(recording)
+        into, out = moving & (signs > 0), moving & (signs < 0)
         direction = int(into.any()) - int(out.any())
-        rows = {0: np.ones(len(recording), dtype=bool), 1: into, -1: out}
+        rows = {0: moving, 1: into, -1: out}
         return _Strokes(direction, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
+
+
+def _moving(recording: Recording) -> NDArray[np.bool_]:
+    """Returns True for the rows at which the tool moves: in a wait the force relaxes."""
+    waiting = waits(recording.motion.position, recording.motion.time)
+    if waiting is None or (here := waiting[recording.motion.rows]).all():
+        return np.ones(len(recording), dtype=bool)
+    return np.asarray(~here)
 
 
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
