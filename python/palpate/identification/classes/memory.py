@@ -374,6 +374,10 @@ def better_with_memory(
     )
     residual = recorded.spread * fit.error(refined)
     error, where_sure = _rms(residual, compared.weight), _rms(residual, compared.sure)
+    of_all = _rmse(network, recordings)
+    if len(refined.log_yield):
+        # Waits do not change a branch that slips, and a play operator keeps its state without contact.
+        error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
     if where_sure**2 > (1.0 + LEAST_GAIN) * compared.rmse_where_sure**2:
         # The pauses of friction that creeps would accept a model that is wrong while the tool moves.
         change = recordings[0].file_unit("force").interval(compared.rmse_where_sure, where_sure)
@@ -398,7 +402,6 @@ def better_with_memory(
     if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
-    of_all = _rmse(network, recordings)
     nrmse = of_all / recorded.spread
     return replace(
         network,
@@ -410,7 +413,7 @@ def better_with_memory(
         settled_rmse=of_all,
         settled_nrmse=(nrmse, left_out_nrmse),
         left_out_nrmse=left_out_nrmse,
-        residuals=fit.n_rows,
+        residuals=sum(map(len, recordings)),
         log=Log(
             found.log.path + network.log.path,
             [*found.log.decisions, decision],
