@@ -31,6 +31,10 @@ class Decision:
     outcome: Literal["accepted", "not accepted", "not tested"]
     reason: str
 
+    @property
+    def accepted(self) -> bool:
+        return self.outcome == "accepted"
+
     def __str__(self) -> str:
         return f"{self.model_class}: {self.outcome} ({self.reason})"
 

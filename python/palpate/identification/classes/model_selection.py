@@ -172,7 +172,8 @@ class Velocity(ModelClass):
             log.decisions.append(decision)
             return below
         over_both_inputs = [f"Over position and velocity: {each}." for each in both.log.decisions]
-        log.follow(replace(both.log, decisions=[decision]), over_both_inputs)
+        findings = [*log.findings, *both.log.findings]
+        log.follow(replace(both.log, decisions=[decision], findings=findings), over_both_inputs)
         return both.best
 
 

@@ -31,7 +31,7 @@ from ..data.compression import Compressed, Compressor, HeldOutRows, around_seam
 from ..data.limits import evenly_spread
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..log import Log, PathPoint, decided, in_words, lowered
+from ..log import Decision, Log, PathPoint, decided, in_words, lowered
 from ..network.fitted import FittedNetwork
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
@@ -379,13 +379,12 @@ class Samples:
         held_out = self.held_out_rows(strokes) if self._for_criterion else None
         return problem_of(rows, resolved_by=self._resolved_by, held_out=held_out)
 
-    def held_out_rows(
-        self, strokes: HysteresisInput | None, known: NDArray[np.bool_] | None = None
-    ) -> HeldOutRows:
+    def held_out_rows(self, strokes: HysteresisInput | None) -> HeldOutRows:
         """Returns the held-out rows with a known direction state."""
-        known = strokes.known if strokes is not None else known
-        rows = self._held_out if known is None else self._held_out & known
-        return HeldOutRows.of(self.data.box, self.data.force, None if strokes is None else strokes.side, rows)
+        if strokes is None:
+            return HeldOutRows.of(self.data.box, self.data.force, None, self._held_out)
+        rows = self._held_out & strokes.known
+        return HeldOutRows.of(self.data.box, self.data.force, strokes.side, rows)
 
 
 def local_noise_ratio(below: Candidate, above: Candidate) -> float:
@@ -407,16 +406,6 @@ def local_noise_ratio(below: Candidate, above: Candidate) -> float:
     return max(1.0, float(np.average(squares, weights=weight)) / mean)
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Result of the comparison of a simpler candidate (lower) with a more complex candidate (upper)."""
-
-    accepted: bool
-    """True if the more complex of two compared candidates is accepted"""
-    reason: str
-    """Change of the criterion, in words"""
-
-
 class Judge:
     """Decides which of two candidates is accepted, by the criterion.
 
@@ -435,12 +424,12 @@ class Judge:
     def better(self, below: Candidate, above: Candidate) -> Candidate:
         """Returns the more complex candidate if it is accepted, else the simpler candidate; adds the decision
         to the log."""
-        judged = self.compared(below, above)
-        self._log.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
-        return above if judged.accepted else below
+        decision = self.compared(below, above)
+        self._log.decisions.append(decision)
+        return above if decision.accepted else below
 
     def accepts(self, below: Candidate, above: Candidate) -> bool:
-        """True if the more complex of two compared candidates is accepted"""
+        """True if the more complex candidate `above` is accepted."""
         return self.compared(below, above).accepted
 
     def fall(self, below: Candidate, above: Candidate) -> float:
@@ -461,16 +450,16 @@ class Judge:
         cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)
         return (falls + cost) / local_noise_ratio(below, above) - cost
 
-    def compared(self, below: Candidate, above: Candidate) -> Judgement:
-        """Compares the upper candidate with the lower one."""
+    def compared(self, below: Candidate, above: Candidate) -> Decision:
+        """Returns the decision on the more complex candidate `above`."""
         name, evidence = self.criterion, self.evidence
         if enough(name, below.criterion(name)):
             reason = f"the error of the {in_words(below.model_class)} is below the just noticeable difference"
-            return Judgement(False, reason)
+            return decided(above.model_class, False, reason)
         falls = self.fall(below, above)
         change = lowered(CRITERION_NAMES[name], falls)
         if name in ON_HELD_OUT_ROWS:
             evidence = max(evidence, standard_error(len(self._samples.held_out_rows(above.strokes).force)))
         if falls < evidence:
-            return Judgement(False, f"{change}, must lower it by at least {evidence:.4g}")
-        return Judgement(True, change)
+            change += f", must lower it by at least {evidence:.4g}"
+        return decided(above.model_class, falls >= evidence, change)
