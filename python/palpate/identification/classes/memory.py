@@ -461,8 +461,8 @@ def _forgotten(
     if network.below == "free" and in_contact <= good < of_all:
         force = recording.file_unit("force")
         yield usable(
-            "where the tool leaves the object and returns, the model forgets how far the object had relaxed: "
-            f"the RMS error is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in "
+            "the model forgets how far the object had relaxed when the tool leaves it and returns: the "
+            f"RMS error is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in "
             "contact, or give --below linear, with which the model remembers but pulls the tool"
         )
 

@@ -248,7 +248,9 @@ def test_a_memory_that_forgets_while_the_tool_is_away_states_it() -> None:
     assert model.memory is not None
     assert model.below == "free"
     assert model.fit.nrmse > 0.1
-    assert "returns, the model forgets how far the object had relaxed" in model.verdict.reasons[0]
+    assert (
+        "the model forgets how far the object had relaxed when the tool leaves it" in model.verdict.reasons[0]
+    )
     assert "--below linear" in model.verdict.reasons[0]
     remembers = palpate.identify(depth, force, time=time, below="linear")
     assert remembers.memory is not None
