@@ -499,7 +499,8 @@ class _Compared:
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
         parts = recorded.recordings
         ends = np.cumsum([len(part) for part in parts])
-        if found.residual is None or found.share is None or len(found.residual) != ends[-1]:
+        several = len(found.lower) > 1
+        if found.residual is None or found.share is None or len(found.residual) != ends[-1] or several:
             # some rows have no residual, such as those at gaps of time
             return cls(np.array(1.0), np.array(1.0), found.rmse_of_all, found.settled_rmse)
         residual, share = (
@@ -516,7 +517,9 @@ class _Compared:
 
 
 def _rms(residual: Float1D, weight: Float1D) -> float:
-    return float(np.sqrt(np.average(residual**2, weights=np.broadcast_to(weight, residual.shape))))
+    """Returns the RMS of residuals (n,) with weights (n,) or one weight; 0 without a weight above 0."""
+    total = float(np.sum(np.broadcast_to(weight, residual.shape)))
+    return float(np.sqrt(np.sum(weight * residual**2) / total)) if total else 0.0
 
 
 def _rmse(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
