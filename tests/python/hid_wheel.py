@@ -215,7 +215,8 @@ class Wheel:
     damping: float = 0.05
     friction: float = 0.05
     period_s: float | None = None
-    """Time that passes with each force report [s]; None: the wheel runs in real time"""
+    """Time that passes with each force report [s]; None: the wheel runs in real time. It answers each force
+    report with its position, so that a program in virtual time needs no other report."""
     gone_after: int | None = None
     """Number of force reports after which the node is gone"""
     deaf_after: int | None = None
@@ -316,9 +317,8 @@ class Wheel:
 
     def _moved(self) -> list[bytes]:
         self.forces += 1
-        if self.period_s is None:
-            return []
-        self.step(self.period_s)
+        if self.period_s is not None:
+            self.step(self.period_s)
         paused = self.paused_after is not None and self.forces >= self.paused_after
         return [self.state_report(paused=True)] * paused + [self.axis_report()]
 
