@@ -13,6 +13,7 @@ from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D, Float2D
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
+from palpate.identification.data.limits import neighbour_correlation
 from palpate.identification.network.basis import Basis
 from palpate.identification.network.separable import (
     CORE_RADIUS,
@@ -154,10 +155,13 @@ def test_correlated_residuals_lead_to_finer_wavelets() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_noise_has_no_structure(seed: int) -> None:
+def test_noise_has_no_neighbour_correlation(seed: int) -> None:
     problem = kinked(0.03, seed)
-    assert not problem.structured(grown(problem).solution)
-    assert problem.structured(problem.solve(Basis.empty(1)))
+    (noise,), (unfitted,) = (
+        each.residuals for each in (grown(problem).solution, problem.solve(Basis.empty(1)))
+    )
+    assert neighbour_correlation(noise) * np.sqrt(len(noise)) < 3.0
+    assert neighbour_correlation(unfitted) * np.sqrt(len(unfitted)) > 10.0
 
 
 def sum_of_few_inputs(x: np.ndarray) -> Float1D:
