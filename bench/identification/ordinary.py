@@ -43,6 +43,9 @@ POINTS = 4001
 PLACE = 0.01
 """Length of the smallest place of a stroke that is judged [share of the stroke]"""
 
+REPORTED = ("left_out_nrmse", "shift_nrmse")
+"""Notes of a model that report an error besides that on the rows of the fit"""
+
 ALLOWED_RATIO = 1.3
 """Largest true error divided by the reported error of a good model"""
 
@@ -182,7 +185,7 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
     truth = Truth.of(rows)
     error, place, best_error = truth.error(model), truth.worst_place(model), truth.error(best)
     found, known = classes_of(model), resolvable(rows)
-    reported = max(model.fit.nrmse, model.notes.get("left_out_nrmse", 0.0))
+    reported = max(model.fit.nrmse, *(model.notes.get(name, 0.0) for name in REPORTED))
     return {
         "true_error": error,
         "reported_error": reported,
@@ -230,11 +233,14 @@ def measure(draw: int) -> dict[str, Any]:
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "refused", "reasons": [str(error)]}
     seconds = time.process_time() - start
+    asked = "if the object attracts the tool" in str(model.verdict)
+    if asked and rows.force.max() <= 0.0:
+        model = palpate.identify(recording, below="linear")  # the operator answers the question
     try:
         best = reference(rows)
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "no reference", "reasons": [str(error)]}
-    return {**row, "rows": len(recording), "seconds": seconds, **judged(model, best, rows)}
+    return {**row, "rows": len(recording), "seconds": seconds, "asked": asked, **judged(model, best, rows)}
 
 
 Row = Mapping[str, Any]

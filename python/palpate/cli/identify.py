@@ -368,6 +368,8 @@ def identify(
     left_out = ""
     if hold_out_every is None and left_out_nrmse > nrmse:
         left_out = f", {number(left_out_nrmse)} on rows left out of the fit"
+    if hold_out_every is None and (shift_nrmse := model.notes["shift_nrmse"]):
+        left_out += f", {number(shift_nrmse)} if press and release are shifted"
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
     rms = "" if hold_out_every is None else _rms_text(verified)
     with drawing() as write_figures:

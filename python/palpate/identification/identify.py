@@ -165,7 +165,8 @@ def identify(
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     known = rows.order if rows.side is None else rows.side
-    verdict = verdict_of(network, recordings, known if every_row else None)
+    attracts = settings.below == "linear"
+    verdict = verdict_of(network, recordings, known if every_row else None, attracts)
     model = model_of(network, recordings[0].units, source, settings, verdict)
     left_out = sum(map(len, recordings)) - len(rows.force)
     model.notes["roles"] = (
@@ -389,8 +390,13 @@ def model_of(
         notes={
             "model_selection": [str(decision) for decision in network.log.decisions],
             "rows": network.log.rows,
-            "identification": [*network.log.notes, *network.band_check],
+            "identification": [
+                *network.log.notes,
+                *([network.shift.sentence] if network.shift and not network.shift.felt else []),
+                *network.band_check,
+            ],
             "left_out_nrmse": network.left_out_nrmse,
+            "shift_nrmse": network.shift.nrmse if network.shift else 0.0,
             "error_rows": network.residuals,
             "verdict": verdict.record(),
         },

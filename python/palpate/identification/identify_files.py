@@ -256,7 +256,8 @@ def _error_on_rows(
 def _identified(
     summary: Summary, recordings: Sequence[LongRecording], settings: IdentifyOptions, log: Log
 ) -> Model:
-    log.notes += mirror_notes(summary.correlation)
+    if settings.below != "linear":
+        log.notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
     log.notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
     if settings.inputs == "auto" and all(recording.has_time for recording in recordings):

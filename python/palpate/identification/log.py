@@ -50,6 +50,17 @@ class PathPoint:
     criterion: float
 
 
+@dataclass(frozen=True)
+class ShiftEffect:
+    """What changes in a model if press and release are shifted against each other in its rows."""
+
+    nrmse: float
+    """RMS change of the force, divided by the standard deviation of the force of the rows [-]"""
+    felt: bool
+    """True if a hand feels the change, or a good model has a smaller error"""
+    sentence: str
+
+
 @dataclass
 class Log:
     """What an identification reports, in order. The logs of two stages are added."""
@@ -111,10 +122,15 @@ def lowered(quantity: str, decrease: float) -> str:
 
 
 def shifted_strokes(timed: bool) -> str:
-    """Returns the causes and cures of strokes that cross where the force is steep, for a recording with or
-    without time: backlash shifts the positions of one stroke, and so does a force that is recorded late."""
+    """Returns the causes and cures of strokes that are shifted against each other, for a recording with or
+    without time."""
     cure = "try --force-late-s" if timed else "record the time"
     return f"backlash or a late force shifts the strokes so: mount the object without backlash, or {cure}"
+
+
+def causes_of_crossing(timed: bool) -> str:
+    """Returns the causes and cures of a release above the press, for a recording with or without time."""
+    return f"{shifted_strokes(timed)}; for a latch or a stored spring, give --no-hysteresis-nonnegative"
 
 
 def _verb(decrease: float) -> str:

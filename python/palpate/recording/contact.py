@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..verdict import FORCE_FLOOR
 from .motion import (
     FORCE_RESOLUTION,
     LEAST_STROKE_ROWS,
@@ -24,7 +25,8 @@ def air_rows(position: Float1D, force: Float1D) -> NDArray[np.bool_]:
     order."""
     waiting = waits(position)
     moving = np.ones(len(position), dtype=np.bool_) if waiting is None or waiting.all() else ~waiting
-    return np.asarray(position < contact_at(position[moving], force[moving]))
+    air = position < contact_at(position[moving], force[moving])
+    return np.asarray(air & (air & moving).any())
 
 
 @np.errstate(over="ignore")  # huge forces are refused later
@@ -40,7 +42,7 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     reach = float(np.ptp(force))
     if not 0.0 < reach < math.inf or len(force) < LEAST_STROKE_ROWS:
         return float(position.min())
-    force = (force - force.min()) / reach
+    zero, force = -float(force.min()) / reach, (force - force.min()) / reach
     of_rows, resolution = noise_of(force), 0.5 * resolution_of(force)
     force = force[order]
     starts = np.linspace(0, len(force), math.isqrt(len(force)), endpoint=False).astype(np.intp)
@@ -57,10 +59,22 @@ def contact_at(position: Float1D, force: Float1D) -> float:
         return float(position.min())  # the second block already differs from the first one: there is no air
     first, of_air = starts[apart[0]], starts[apart[0] - 1]
     met = np.abs(away[first : first + rows[apart[0]]]) > SIGNIFICANT_STANDARD_ERRORS
-    contact = float(position[order[first + int(np.argmax(met))]])
-    # There is no air if the force changes along it, or may change as much as behind it.
-    x = position[order[:of_air]] - position[order[:of_air]].mean()
-    trend, squared = float(np.abs(x @ force[:of_air])), float(x @ x)
-    behind, rise = float(position.max()) - contact, float(np.abs(force - air[apart[0]]).max())
-    is_air = trend < SIGNIFICANT_STANDARD_ERRORS * noise * math.sqrt(squared)
-    return contact if is_air and trend * behind < 0.5 * squared * rise else float(position.min())
+    contact = int(first + np.argmax(met))
+    # In air the force is constant, and zero. If it is not zero, its slope must change at the contact, from that
+    # over the same way before: the force of a magnet begins nowhere.
+    position = position[order]
+    from_air, force = position - position[:of_air].mean(), force - force[:of_air].mean()
+
+    def slope(rows: slice) -> tuple[float, float]:
+        """Returns the slope from the middle of the air to some rows, and its standard error."""
+        squared = float(from_air[rows] @ from_air[rows])
+        if squared == 0.0:
+            return 0.0, math.inf
+        return float(from_air[rows] @ force[rows]) / squared, noise / math.sqrt(squared)
+
+    end = int(np.searchsorted(position, 2.0 * position[contact] - position[0], side="right"))
+    (in_air, error), (behind, error_behind) = slope(slice(of_air)), slope(slice(contact, end))
+    is_constant = abs(in_air) < SIGNIFICANT_STANDARD_ERRORS * error
+    is_zero = abs(float(air[apart[0]]) - zero) < FORCE_FLOOR
+    bends = abs(behind - in_air) > SIGNIFICANT_STANDARD_ERRORS * math.hypot(error, error_behind)
+    return float(position[contact if is_constant and (is_zero or bends) else 0])

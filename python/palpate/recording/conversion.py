@@ -439,9 +439,10 @@ def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
         signs.append("the position falls in rows whose direction is into the object")
     if not signs:
         return []
+    attracts = ", if the object attracts the tool identify it with --below linear"
     return [
         f"{' and '.join(signs)}: if the position grows out of the object give --negate position, "
-        "if the force is positive when pulling give --negate force"
+        f"if the force is positive when pulling give --negate force{'' if position_falls else attracts}"
     ]
 
 

@@ -17,6 +17,7 @@ from palpate import InputError, Recording, read_recording
 from palpate.cli.main import main
 from palpate.recording.checks import CHECKS, findings_of, quality_findings
 from palpate.recording.checks.recordings import UNIT_RATIOS
+from palpate.recording.contact import air_rows
 
 
 def rows_of(name: str, draw: int = 0) -> Rows:
@@ -230,6 +231,30 @@ def test_a_friction_of_the_wrong_sign_is_not_advised_to_be_late() -> None:
     driven = sign_sentence(lambda time, x: 0.2 * x - 0.5 * np.sign(np.sin(2.0 * np.pi * 0.5 * time)))
     assert "--negate force" in driven
     assert "--force-late-s" not in driven
+
+
+def magnet(sign: float, seed: int) -> palpate.Recording:
+    """Returns a slow press and release by hand on a magnet, whose force begins nowhere."""
+    x = 0.02 * 0.5 * (1.0 - np.cos(np.linspace(0.0, 4.0 * np.pi, 2000)))
+    f = sign * 5.0 * (0.3 / (1.3 - x / 0.02)) ** 3
+    return palpate.Recording.from_arrays(x, f + np.random.default_rng(seed).normal(0.0, 0.005, len(x)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_force_of_a_magnet_is_not_that_of_air(seed: int) -> None:
+    repelling = magnet(1.0, seed)
+    assert repelling.verdict.level == "good"
+    assert not air_rows(repelling.position, repelling.force).any()
+
+
+def test_who_states_that_the_object_attracts_is_not_asked_for_its_sign() -> None:
+    attracting = magnet(-1.0, 0)
+    asked = palpate.identify(attracting)
+    assert asked.verdict.level == "usable"
+    assert "if the object attracts the tool identify it with --below linear" in str(asked.verdict)
+    stated = palpate.identify(attracting, below="linear")
+    assert stated.verdict.level == "good"
+    np.testing.assert_array_equal(stated.force(attracting.position), asked.force(attracting.position))
 
 
 def held(share: float) -> tuple[np.ndarray, np.ndarray]:

@@ -131,7 +131,8 @@ def test_signs_are_reversed_only_with_negate(csv_file: Write) -> None:
     assert [note for note in recording.notes if "--negate" in note] == [
         "the force falls with position over the whole file (correlation -1.00): "
         "if the position grows out of the object give --negate position, "
-        "if the force is positive when pulling give --negate force"
+        "if the force is positive when pulling give --negate force, "
+        "if the object attracts the tool identify it with --below linear"
     ]
     for name in ("position", "depth_mm"):
         negated = read_recording(path, negate=(name,))

@@ -19,11 +19,10 @@ from ...errors import InputError
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..log import Log, in_words, shifted_strokes
+from ..log import Log, in_words
 from ..network.basis import Basis
 from ..network.constraints import (
     Bound,
-    crosses_where_steep,
     crossing,
     domain_bounds,
     impose,
@@ -194,10 +193,7 @@ class ClassSelection:
         nonnegative = self.options.hysteresis_nonnegative and free.strokes is not None
         if not nonnegative or not (above := self.above_press(free)):
             return note
-        late = ""
-        if crosses_where_steep(free.problem, free.solution):
-            late = f" Perhaps {shifted_strokes(bool(self.data.parts))}."
-        return f"{note} Without this constraint {above}; a passive object cannot do that.{late}"
+        return f"{note} Without this constraint {above}; a passive object cannot do that."
 
     def above_press(self, free: Candidate) -> str:
         """Returns how far release is above press in a candidate without constraints, and where; an empty text

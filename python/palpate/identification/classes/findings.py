@@ -18,7 +18,7 @@ from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
-from ..log import Log, latest, shifted_strokes
+from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..network.separable import TINY
@@ -26,6 +26,7 @@ from ..options import IdentifyOptions
 from ..search.evidence import Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_residual
+from .shift import shift_of
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -51,10 +52,14 @@ def error_findings(nrmse: float, rows: str, cure: str = "") -> list[Finding]:
 
 
 def verdict_of(
-    network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
+    network: FittedNetwork,
+    recordings: Sequence[Recording],
+    side: Float1D | None = None,
+    attracts: bool = False,
 ) -> Verdict:
-    """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    findings = [*findings_of(recordings, side), *network.log.findings]
+    """Returns the verdict on an identified network; `side` (n,) is the direction of all rows, and `attracts`
+    is True if the object is stated to attract the tool."""
+    findings = [*findings_of(recordings, side, attracts), *network.log.findings]
     fitted, left_out = network.settled_nrmse
     rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""
@@ -173,8 +178,7 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
         if loop < 0.0:
             reason = (
                 f"release is {unit.text(-float(loop))} above press, which the model excludes; "
-                f"{shifted_strokes(bool(data.parts))}; for a latch or a stored spring, give "
-                "--no-hysteresis-nonnegative"
+                f"{causes_of_crossing(bool(data.parts))}"
             )
     return [
         usable(
@@ -183,6 +187,30 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
             f"{noticed[worst]:.2g} just noticeable differences: {reason}"
         )
     ]
+
+
+def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
+    """Returns what changes in a model without the shift of press against release that the rows show; None
+    without such a shift."""
+    shift, best = shift_of(selection), selection.best
+    if shift is None:
+        return None
+    box, data, unit = np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None], best.data, best.data.force_unit
+    (middle, half), (true_middle, true_half) = best.parts_at(box), shift.without.parts_at(box)
+    force = np.concatenate([true_middle + true_half, true_middle - true_half])
+    apart = np.concatenate([middle + half, middle - half]) - force
+    place = _places(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
+    mean_apart, mean_force = (np.bincount(place, values) / np.bincount(place) for values in (apart, force))
+    worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
+    rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
+    distance = data.position_unit.text(shift.distance * float(data.reach[0]))
+    return ShiftEffect(
+        rms / spread,
+        worst > MOST_JND or rms > USABLE_NRMSE * spread,
+        f"press and release are shifted against each other: moved by {distance}, they lower the RMS error from "
+        f"{unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} RMS, at "
+        f"one place by {worst:.2g} just noticeable differences; {shifted_strokes(bool(data.parts))}",
+    )
 
 
 def energy_findings(best: Candidate) -> list[Finding]:
@@ -318,8 +346,10 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         notes, findings = [*notes, note], findings + of_period
     findings += wait_findings(best)
     # One cause of an error hides the others.
+    shift = effect_of_shift(selection)
     findings += (
-        log.findings
+        ([usable(shift.sentence)] if shift and shift.felt else [])
+        or log.findings
         or energy_findings(best)
         or limit_findings(best, options)
         or drift_findings(best)
@@ -352,6 +382,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         residual=best.residual,
         share=share,
         left_out_nrmse=replace(error, residual=left_out).nrmse,
+        shift=shift,
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(
             best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]

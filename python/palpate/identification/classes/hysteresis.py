@@ -17,9 +17,9 @@ from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
 from ..data.limits import evenly_spread
 from ..data.strokes import FAR, LEAST_KNOWN_SHARE, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
-from ..log import Decision, shifted_strokes
+from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
-from ..network.constraints import crosses_where_steep, impose
+from ..network.constraints import impose
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate, Samples
 from .class_selection import ClassSelection, ModelClass, straight_line
@@ -243,14 +243,10 @@ class Hysteresis(ModelClass):
                 f"with the opposite sign of the recorded force the NRMSE is {turned / spread:.3g}. Press and "
                 "release may be exchanged: give --negate force or --negate position"
             )
-        elif crosses_where_steep(free.problem, free.solution):
-            cure = "the release force is above the press force where the force is steep; " + shifted_strokes(
-                bool(self._selection.data.parts)
-            )
         else:
             cure = (
-                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). The "
-                "object may release stored energy, as a latch does: give --no-hysteresis-nonnegative"
+                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). "
+                f"{causes_of_crossing(bool(self._selection.data.parts))}"
             )
         sentence = f"hysteresis gains energy: {where} ({cost}); {cure}"
         self._selection.log.findings[:] = [usable(sentence)]

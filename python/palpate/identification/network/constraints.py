@@ -339,26 +339,6 @@ REPORTED_HEIGHT = 3.0
 """Release force above press force is reported only from this difference on [multiples of the RMS error]:
 larger than noise."""
 
-LATE_SLOPE_RATIO = 2.0
-"""Ratio of the slope of the force, at positions where the release force is above the press force, to the mean
-slope, from which the force is taken as delayed [-]."""
-
-
-def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
-    """True if the release force is above the press force mainly where the force is steep, as with a delayed
-    force.
-
-    A force recorded with delay t reduces the hysteresis h by slope * speed * t.
-    """
-    places = np.linspace(0.0, 1.0, COMPARED_POSITIONS)
-    columns, slopes = free.basis.columns(places[:, None]), free.basis.slopes(places)
-    (_, slope, *of_g), (bias, tilt, *of_h) = problem.readout @ free.coefficients
-    steepness = np.abs(slope + slopes @ np.asarray(of_g))
-    above = np.maximum(-(bias + tilt * places + columns @ np.asarray(of_h)), 0.0)
-    if not above.any():
-        return False
-    return bool(np.average(steepness, weights=above**2) > LATE_SLOPE_RATIO * np.mean(steepness))
-
 
 @dataclass(frozen=True)
 class Crossing:

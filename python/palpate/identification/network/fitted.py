@@ -15,7 +15,7 @@ from ...model import Fit, PathStep
 from ...model.band import Band
 from ...recording.units import UNSTATED_UNIT, Unit
 from ..data.limits import ForceScale
-from ..log import Log
+from ..log import Log, ShiftEffect
 from .separable import Solution
 
 
@@ -107,6 +107,8 @@ class FittedNetwork:
     """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
     left_out_nrmse: float = 0.0
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
+    shift: ShiftEffect | None = None
+    """Effect of a shift of press against release; None if the rows show none"""
     residuals: int = 0
     """Number of rows with a residual"""
     residual_correlation: float = 0.0

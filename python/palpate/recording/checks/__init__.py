@@ -100,21 +100,24 @@ CHECKS = (
 """All checks, in the order of their findings. Each threshold is described in its function."""
 
 
-def quality_findings(recording: Recording) -> list[Finding]:
-    """Returns findings on a recording as it was read; empty without defects."""
+def quality_findings(recording: Recording, attracts: bool = False) -> list[Finding]:
+    """Returns findings on a recording as it was read; empty without defects. `attracts` is True if the object
+    is stated to attract the tool."""
     if len(recording) < MIN_ROWS:
         return []
-    checked = Checked(recording)
+    checked = Checked(recording, attracts)
     return [finding for check in CHECKS for finding in check.findings(checked, **check.thresholds)]
 
 
-def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
+def findings_of(
+    recordings: Sequence[Recording], side: Float1D | None = None, attracts: bool = False
+) -> list[Finding]:
     """Returns findings on each recording, with its name if there are several, and on all of them together.
 
     `side` (n,) is the direction of the rows of all recordings if they do not state it.
     """
     if len(recordings) == 1:
-        return quality_findings(recordings[0])
+        return quality_findings(recordings[0], attracts)
     names = [
         each.source.files[0] if each.source.files else f"recording {number}"
         for number, each in enumerate(recordings, 1)
@@ -122,6 +125,6 @@ def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) ->
     found = [
         Finding(finding.level, f"{name}: {finding.sentence}")
         for name, recording in zip(names, recordings, strict=True)
-        for finding in quality_findings(recording)
+        for finding in quality_findings(recording, attracts)
     ]
     return found + scale_findings(recordings, side)

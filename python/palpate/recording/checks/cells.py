@@ -41,6 +41,8 @@ class Checked:
     """Recording to check, with the facts that several checks need."""
 
     recording: Recording
+    attracts: bool = False
+    """True if the object is stated to attract the tool"""
 
     @cached_property
     def lower(self) -> float:

@@ -60,7 +60,7 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
                 "the zero of the force moved, record again"
             )
         ]
-    if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
+    if is_loop or checked.attracts or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
     # Each row counts by the way of the tool there, so that neither a wait nor the rate of the rows decides.
     (xx, xf), (_, ff) = np.cov(x, f, aweights=np.abs(np.gradient(x)))

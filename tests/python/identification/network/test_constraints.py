@@ -16,7 +16,6 @@ from palpate.identification.data.compression import Compressor
 from palpate.identification.network import constraints
 from palpate.identification.network.basis import Basis
 from palpate.identification.network.constraints import (
-    crosses_where_steep,
     domain_bounds,
     impose,
     violated_positions,
@@ -101,13 +100,6 @@ def test_constraints_hold_if_no_round_is_left(
             free, mixed.coefficients + 1e-6 * (free.coefficients - mixed.coefficients)
         )
         assert any(len(violated_positions(problem, nearer, bound)) for bound in bounds)
-
-
-def test_strokes_that_do_not_cross_are_not_delayed() -> None:
-    problem, free = random_network(0)
-    apart = problem.with_coefficients(free, free.coefficients.copy())
-    above = np.linalg.solve(problem.readout, np.vstack([np.zeros(8), np.eye(8)[0]]))
-    assert not crosses_where_steep(problem, replace(apart, coefficients=above))
 
 
 def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Press and release that are shifted against each other: the error of the model contains the shift."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate
+from conftest import sampled
+from palpate.cli.main import main
+from palpate.recording import Recording
+
+TRAVEL, N = 4e-3, 1200
+
+
+def button(x: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Returns the force of a button with a click and friction [N]."""
+    u = x / TRAVEL
+    click = 0.5 / (1.0 + np.exp(-(u - 0.45) / 0.02))
+    return np.asarray((1.0 + 0.08 * s) * (1.0 - np.exp(-u / 0.03)) + 0.6 * u - click)
+
+
+def recorded(shift: float, force: object = button, late_s: float = 0.0, seed: int = 0) -> Recording:
+    """Returns two presses and releases whose positions are `shift` apart [m], with noise and time."""
+    random, time = np.random.default_rng(seed), np.linspace(0.0, 8.0, 4 * N)
+    x = TRAVEL * (1.0 - np.abs(1.0 - time % 4.0 / 2.0))
+    side = np.where(time % 4.0 < 2.0, 1.0, -1.0)
+    f = np.interp(time - late_s, time, force(x, side)) + random.normal(0.0, 0.003, len(x))
+    return Recording.from_arrays(x + 0.5 * shift * side + random.normal(0.0, 1e-6, len(x)), f, time)
+
+
+def true_error(model: palpate.Model) -> float:
+    """Returns the NRMSE of a model on the exact force of the button."""
+    x = np.linspace(0.02, 0.98, 2000) * TRAVEL
+    pairs = [(button(x, np.full(2000, s)), model.force(x, direction=s)) for s in (1.0, -1.0)]
+    truth, found = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    return float(np.sqrt(np.mean((found - truth) ** 2)) / np.std(truth))
+
+
+@pytest.mark.parametrize("shift", sampled([20e-6, 40e-6, 80e-6], 40e-6))
+def test_the_error_contains_the_shift_of_the_strokes(shift: float) -> None:
+    model = palpate.identify(recorded(shift))
+    assert model.notes["shift_nrmse"] > 1.5 * model.fit.nrmse
+    assert 0.5 < model.notes["shift_nrmse"] / true_error(model) < 2.0
+    assert "mount the object without backlash" in f"{model.notes['identification']} {model.verdict}"
+
+
+@pytest.mark.parametrize("seed", sampled(range(6), 0))
+def test_strokes_without_a_shift_have_none(seed: int) -> None:
+    model = palpate.identify(recorded(0.0, seed=seed))
+    assert model.fit.model_class == "hysteresis"
+    assert model.notes["shift_nrmse"] < 1.5 * model.fit.nrmse
+    assert model.verdict.level == "good"
+
+
+def test_a_shift_that_a_hand_feels_lowers_the_verdict() -> None:
+    model = palpate.identify(recorded(0.0, late_s=0.08))
+    assert model.verdict.level == "usable"
+    assert "press and release are shifted against each other: moved by 0.0003" in str(model.verdict)
+    assert "try --force-late-s" in str(model.verdict)
+
+
+def test_a_single_valued_force_is_the_mean_of_shifted_strokes() -> None:
+    def spring(x: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return 300.0 * x + 4000.0 * np.maximum(x - 0.6 * TRAVEL, 0.0)
+
+    model, x = palpate.identify(recorded(20e-6, spring)), np.linspace(0.02, 0.98, 500) * TRAVEL
+    assert model.kind == "position"
+    assert model.notes["shift_nrmse"] == 0.0
+    assert np.std(model.force(x) - spring(x, x)) < 0.01 * np.std(spring(x, x))
+
+
+def test_the_line_of_the_error_states_the_shift(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = recorded(40e-6).write(tmp_path / "button.csv")
+    assert main(["identify", str(path), "-o", str(tmp_path / "button.json")]) == 0
+    assert "if press and release are shifted" in " ".join(capsys.readouterr().out.split())
