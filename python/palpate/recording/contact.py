@@ -60,8 +60,8 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     first, of_air = starts[apart[0]], starts[apart[0] - 1]
     met = np.abs(away[first : first + rows[apart[0]]]) > SIGNIFICANT_STANDARD_ERRORS
     contact = int(first + np.argmax(met))
-    # In air the force is constant, and zero. If it is not zero, its slope must change at the contact, from that
-    # over the same way before: the force of a magnet begins nowhere.
+    # In air the force is constant, and zero. If it is not zero, its slope must change at the contact,
+    # compared over the same way behind: the force of a magnet begins nowhere.
     position = position[order]
     from_air, force = position - position[:of_air].mean(), force - force[:of_air].mean()
 

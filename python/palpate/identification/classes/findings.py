@@ -191,7 +191,7 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
 
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     """Returns what changes in a model without the shift of press against release that the rows show; None
-    without such a shift."""
+    without such a shift, or if it changes less than the error on the rows."""
     shift, best = shift_of(selection), selection.best
     if shift is None:
         return None
@@ -203,13 +203,16 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     mean_apart, mean_force = (np.bincount(place, values) / np.bincount(place) for values in (apart, force))
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
     rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
+    felt = worst > MOST_JND or rms > USABLE_NRMSE * spread
+    if not felt and rms < best.error.rmse:
+        return None
     distance = data.position_unit.text(shift.distance * float(data.reach[0]))
     return ShiftEffect(
         rms / spread,
-        worst > MOST_JND or rms > USABLE_NRMSE * spread,
-        f"press and release are shifted against each other: moved by {distance}, they lower the RMS error from "
-        f"{unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} RMS, at "
-        f"one place by {worst:.2g} just noticeable differences; {shifted_strokes(bool(data.parts))}",
+        felt,
+        f"press and release are shifted against each other: moved by {distance}, they lower the RMS error "
+        f"from {unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} "
+        f"RMS, at one place by {worst:.2g} just noticeable differences; {shifted_strokes(bool(data.parts))}",
     )
 
 

@@ -32,14 +32,14 @@ class Shift:
 
 
 def shift_of(selection: ClassSelection) -> Shift | None:
-    """Returns the distance between press and release that lowers BIC as much as a model class must; None if
-    there is none.
+    """Returns the distance between press and release that explains most of a release above the press; None
+    without such a release, or if no distance explains it.
 
     With a late force, or with backlash between the position sensor and the object, the force of the rows is
-    g + s h at x - s d/2 for the direction s and the distance d. Where g rises, this lowers the press below the
-    release, which a hysteresis h >= 0 excludes. The wavelets of the model are therefore refined on moved rows,
-    and the errors are compared under the constraints. A single-valued force is the mean of both strokes, which
-    the shift hardly changes.
+    g + s h at x - s d/2 for the direction s and the distance d. Where g rises, this lowers the press below
+    the release, which a hysteresis h >= 0 excludes. If this constraint raises the criterion as much as a
+    model class must lower it, the wavelets of the model are refined on moved rows. A single-valued force is
+    the mean of both strokes, which the shift hardly changes.
     """
     best, data, options = selection.best, selection.best.data, selection.options
     side = data.order if data.side is None else data.side
@@ -47,8 +47,9 @@ def shift_of(selection: ClassSelection) -> Shift | None:
         return None
     weight = best.error_on(data.weight).weight * (side != 0.0)
 
-    def moved(shift: float) -> Candidate:
-        """Returns the model with refined wavelets of rows that are moved by a shift [travel]."""
+    def moved(shift: float) -> tuple[float, Candidate]:
+        """Returns the model with refined wavelets of rows that are moved by a shift [travel], and its RMS
+        error without the constraints."""
         rows = replace(
             data,
             positions=data.positions - 0.5 * shift * data.reach * side[:, None],
@@ -58,12 +59,17 @@ def shift_of(selection: ClassSelection) -> Shift | None:
         )
         samples = Samples(rows, options, selection.cells)
         problem = samples.problem(samples.rows(best.strokes), best.strokes)
-        found = selection.growth.refined(problem, best.solution.basis)
-        return replace(best, problem=problem, solution=impose(problem, found, selection.bounds(problem)))
+        free = selection.growth.refined(problem, best.solution.basis)
+        kept = impose(problem, free, selection.bounds(problem))
+        return problem.rmse(free), replace(best, problem=problem, solution=kept)
 
-    unmoved, tried = moved(0.0).rmse, [moved(shift) for shift in SHIFTS]
-    least = min(range(len(SHIFTS)), key=lambda each: tried[each].rmse)
-    ratio, n = (tried[least].rmse + TINY) / (unmoved + TINY), best.problem.independent
-    if -2.0 * n * math.log(ratio) - math.log(n) < options.search.evidence:
+    free, kept = moved(0.0)
+    if (
+        2.0 * best.problem.independent * math.log((kept.rmse + TINY) / (free + TINY))
+        < options.search.evidence
+    ):
         return None
-    return Shift(float(SHIFTS[least]), unmoved, tried[least])
+    distance, (_, without) = min(((d, moved(d)) for d in SHIFTS.tolist()), key=lambda each: each[1][1].rmse)
+    if kept.rmse**2 - without.rmse**2 < 0.5 * (kept.rmse**2 - free**2):
+        return None
+    return Shift(distance, kept.rmse, without)
