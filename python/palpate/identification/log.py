@@ -60,6 +60,10 @@ class ShiftEffect:
     """True if a hand feels the change, or a good model has a smaller error"""
     sentence: str
 
+    @property
+    def note(self) -> str:
+        return f"{self.sentence[0].upper()}{self.sentence[1:]}."
+
 
 @dataclass
 class Log:

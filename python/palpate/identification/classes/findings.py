@@ -192,21 +192,26 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     """Returns what changes in a model without the shift of press against release that the rows show; None
     without such a shift, or if it changes less than the error on the rows."""
-    shift, best = shift_of(selection), selection.best
-    if shift is None:
+    best = selection.best
+    if (shift := shift_of(selection, best)) is None:
         return None
     box, data, unit = np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None], best.data, best.data.force_unit
-    (middle, half), (true_middle, true_half) = best.parts_at(box), shift.without.parts_at(box)
+    (middle, half), (true_middle, true_half) = (
+        each.parts_at(box) if best.strokes is not None else (each.force_near(box), 0.0)
+        for each in (best, shift.without)
+    )
     force = np.concatenate([true_middle + true_half, true_middle - true_half])
     apart = np.concatenate([middle + half, middle - half]) - force
     place = _places(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
     mean_apart, mean_force = (np.bincount(place, values) / np.bincount(place) for values in (apart, force))
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
     rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
-    felt = worst > MOST_JND or rms > USABLE_NRMSE * spread
+    felt = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
     if not felt and rms < best.error.rmse:
         return None
     distance = data.position_unit.text(shift.distance * float(data.reach[0]))
+    if shift.lag_s is not None:
+        distance += f" at the largest speed, as by a force that is {1e3 * shift.lag_s:.3g} ms late"
     return ShiftEffect(
         rms / spread,
         felt,

@@ -245,7 +245,7 @@ class Hysteresis(ModelClass):
             )
         else:
             cure = (
-                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). "
+                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}); "
                 f"{causes_of_crossing(bool(self._selection.data.parts))}"
             )
         sentence = f"hysteresis gains energy: {where} ({cost}); {cure}"

@@ -23,6 +23,7 @@ from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass
 from .findings import USABLE_NRMSE
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
+from .shift import shift_of
 
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
@@ -161,6 +162,8 @@ class Velocity(ModelClass):
         both = select(over_both, self._selection.options)
         weight = below.fit_weight[rows]
         before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
+        if shift := shift_of(self._selection, below):
+            before *= (shift.without.rmse / shift.before) ** 2
         share = 1.0 - after / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
