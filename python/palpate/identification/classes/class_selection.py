@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +35,9 @@ from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Judge, Samples, criterion_of
 from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
+
+if TYPE_CHECKING:
+    from .shift import Shift
 
 REGROWTH_ERROR_RATIO = 1.01
 """Ratio of the RMS error with constraints to the RMS error without constraints, above which a network is
@@ -80,6 +84,8 @@ class ClassSelection:
         self.judge = Judge(self.samples, options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
+        self.shifted: tuple[Candidate, Shift | None] | None = None
+        """The last candidate that was tested for a shift of its strokes, and the shift"""
         self._fixed_force = self._fixed_in_box()
         self.spread = float(np.std(data.force[data.reported])) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))

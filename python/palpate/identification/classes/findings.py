@@ -209,15 +209,16 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     felt = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
     if not felt and rms < best.error.rmse:
         return None
-    distance = data.position_unit.text(shift.distance * float(data.reach[0]))
-    if shift.lag_s is not None:
-        distance += f" at the largest speed, as by a force that is {1e3 * shift.lag_s:.3g} ms late"
+    amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
+    if shift.late:
+        amount, lag_s = f"a force that is {1e3 * shift.amount:.3g} ms late", shift.amount
+    causes = shifted_strokes(bool(data.parts), lag_s)
     return ShiftEffect(
         rms / spread,
         felt,
-        f"press and release are shifted against each other: moved by {distance}, they lower the RMS error "
-        f"from {unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} "
-        f"RMS, at one place by {worst:.2g} just noticeable differences; {shifted_strokes(bool(data.parts))}",
+        f"press and release are shifted against each other, by {amount}: without it the RMS error falls from "
+        f"{unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} RMS, "
+        f"at one place by {worst:.2g} just noticeable differences; {causes}",
     )
 
 

@@ -163,7 +163,10 @@ class Velocity(ModelClass):
         weight = below.fit_weight[rows]
         before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
         if shift := shift_of(self._selection, below):
-            before *= (shift.without.rmse / shift.before) ** 2
+            # A network that is grown without the shift explains as much as the velocity of a late force.
+            moved = shift.without
+            grown = self._selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
+            before *= (grown.problem.rmse(grown.solution) / shift.before) ** 2
         share = 1.0 - after / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)

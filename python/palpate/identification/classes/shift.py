@@ -12,29 +12,32 @@ import numpy as np
 import scipy
 
 from ..._typing import Float1D
+from ...recording.lag import LONGEST_LAG_S
 from ..data.strokes import HysteresisInput
 from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution
 from ..search.evidence import Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
 
-SHIFTS = 2.0 ** np.arange(-10.0, -2.0, 0.5)
-"""Distances between press and release that are tried [travel], from the width of a click to a quarter of the
-travel."""
+DISTANCES = 2.0 ** np.arange(-10.0, -4.0, 0.5)
+"""Distances between press and release that are tried [travel], from the width of a click to a distance that
+is seen in a plot."""
+
+LAGS_S = LONGEST_LAG_S * 2.0 ** np.arange(-7.0, 0.5, 0.5)
+"""Lags of the force that are tried [s]."""
 
 REFINEMENTS = 8
-"""Number of steps of the search between two of these distances."""
+"""Number of steps of the search between two of these values."""
 
 
 @dataclass(frozen=True)
 class Shift:
     """Distance between press and release that explains the rows better than the model alone."""
 
-    distance: float
-    """[travel]"""
-    lag_s: float | None
-    """Lag of the force that makes this distance at the largest speed [s]; None for the same distance at every
-    speed, as with backlash"""
+    amount: float
+    """Distance [travel], or lag of the force [s]"""
+    late: bool
+    """True for a lag"""
     before: float
     """RMS error of the model on the rows [force]"""
     without: Candidate
@@ -50,47 +53,48 @@ def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     rises, the press is then below the release, which a passive object excludes. If a hysteresis of any sign
     lowers BIC as much as a model class must, the wavelets of the model are refined on moved rows.
     """
+    if selection.shifted is None or selection.shifted[0] is not best:
+        selection.shifted = best, _shift_of(selection, best)
+    return selection.shifted[1]
+
+
+def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     data, options = best.data, selection.options
     side = data.order if data.side is None else data.side
-    if side is None or len(data.names) > 1:
-        return None
+    if side is None or len(data.names) > 1 or best.moving is not None:
+        return None  # a late force also looks like a mass and a damping, which are subtracted here
     known = side != 0.0
     weight = best.error_on(data.weight).weight * known
-    fastest = max((float(np.abs(part.velocity).max()) for part in data.parts), default=0.0)
 
-    def moved(distance: float, late: bool) -> Float1D:
-        """Returns the position of the object at each row (n,)."""
-        position = data.positions[:, 0] - 0.5 * distance * data.reach[0] * side
-        for part in data.parts if late else ():
-            at = part.row_time - 0.5 * distance * data.reach[0] / fastest
-            position[part.rows] = np.interp(at, part.time, part.position)
-        return np.asarray(position)
+    def moved(amount: float, late: bool) -> Float1D:
+        """Returns the position of the object at each row (n,) for a distance [travel] or a lag [s]."""
+        if not late:
+            return np.asarray(data.positions[:, 0] - 0.5 * amount * data.reach[0] * side)
+        position = data.positions[:, 0].copy()
+        for part in data.parts:
+            position[part.rows] = np.interp(part.row_time - amount, part.time, part.position)
+        return position
 
     def refined(position: Float1D, strokes: HysteresisInput | None) -> tuple[SeparableProblem, Solution]:
         """Returns the refined wavelets for other positions (n,) of the rows."""
         ends = data.lower, data.lower + data.reach
-        rows = replace(
-            data, positions=position[:, None], force=best.static_force, corners=ends, weight=weight
-        )
+        rows = replace(data, positions=position[:, None], corners=ends, weight=weight)
         samples = Samples(rows, options, selection.cells)
         problem = samples.problem(samples.rows(strokes), strokes)
         return problem, selection.growth.refined(problem, best.solution.basis)
 
-    def constrained(problem: SeparableProblem, found: Solution) -> Candidate:
-        return replace(best, problem=problem, solution=impose(problem, found, selection.bounds(problem)))
-
     def at(position: Float1D) -> Candidate:
         """Returns the model for other positions (n,) of the rows."""
-        return constrained(*refined(position, best.strokes))
+        problem, found = refined(position, best.strokes)
+        return replace(best, problem=problem, solution=impose(problem, found, selection.bounds(problem)))
 
     unmoved = at(data.positions[:, 0])
     problem, free = refined(data.positions[:, 0], best.strokes or HysteresisInput(side, known))
-    error = problem.rmse(free)
     if criterion_of(problem, free, "bic") + options.search.evidence > unmoved.criterion("bic"):
         return None
-    causes = [False, True] if fastest > 0.0 else [False]
-    late, near = min(product(causes, SHIFTS.tolist()), key=lambda each: at(moved(each[1], each[0])).rmse)
-    distance = 2.0 ** float(
+    amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]
+    near, late = min(amounts, key=lambda each: at(moved(*each)).rmse)
+    amount = 2.0 ** float(
         scipy.optimize.minimize_scalar(
             lambda power: at(moved(2.0**power, late)).rmse,
             bounds=(math.log2(near) - 0.5, math.log2(near) + 0.5),
@@ -98,10 +102,7 @@ def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
             options={"maxiter": REFINEMENTS},
         ).x
     )
-    without = at(moved(distance, late))
-    grown = selection.growth.grow(without.problem, without.solution.basis, best.model_class)
-    without = min(without, constrained(grown.problem, grown.solution), key=lambda each: each.rmse)
-    if unmoved.rmse**2 - without.rmse**2 < 0.5 * (unmoved.rmse**2 - error**2):
+    without = at(moved(amount, late))
+    if unmoved.rmse**2 - without.rmse**2 < 0.5 * (unmoved.rmse**2 - problem.rmse(free) ** 2):
         return None
-    lag_s = 0.5 * distance * float(data.reach[0]) / fastest if late else None
-    return Shift(distance, lag_s, unmoved.rmse, without)
+    return Shift(amount, late, unmoved.rmse, without)
