@@ -233,14 +233,20 @@ def measure(draw: int) -> dict[str, Any]:
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "refused", "reasons": [str(error)]}
     seconds = time.process_time() - start
-    asked = "if the object attracts the tool" in str(model.verdict)
-    if asked and rows.force.max() <= 0.0:
+    in_question = "if the object attracts the tool" in str(model.verdict)
+    if in_question and rows.force.max() <= 0.0:
         model = palpate.identify(recording, below="linear")  # the operator answers the question
     try:
         best = reference(rows)
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "no reference", "reasons": [str(error)]}
-    return {**row, "rows": len(recording), "seconds": seconds, "asked": asked, **judged(model, best, rows)}
+    return {
+        **row,
+        "rows": len(recording),
+        "seconds": seconds,
+        "sign_in_question": in_question,
+        **judged(model, best, rows),
+    }
 
 
 Row = Mapping[str, Any]

@@ -392,7 +392,7 @@ def model_of(
             "rows": network.log.rows,
             "identification": [
                 *network.log.notes,
-                *([network.shift.note] if network.shift and not network.shift.felt else []),
+                *([network.shift.note] if network.shift and not network.shift.perceptible else []),
                 *network.band_check,
             ],
             "left_out_nrmse": network.left_out_nrmse,

@@ -56,7 +56,7 @@ class ShiftEffect:
 
     nrmse: float
     """RMS change of the force, divided by the standard deviation of the force of the rows [-]"""
-    felt: bool
+    perceptible: bool
     """True if a hand feels the change, or a good model has a smaller error"""
     sentence: str
 

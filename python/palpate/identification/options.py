@@ -125,8 +125,8 @@ class IdentifyOptions:
     one direction, or an angle that closes a revolution."""
     below: str = "auto"
     """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves;
-    linear continues straight, because the tool is fixed to the object or attracted by it. auto is free,
-    unless the recording shows that the object pulls the tool."""
+    linear continues straight, because the object holds or attracts the tool. auto is free, unless the
+    recording shows that the object pulls the tool."""
     above: str = "linear"
     """Force above the recorded positions: linear or free. linear continues straight, free falls to zero."""
     search: SearchOptions = field(default_factory=SearchOptions)

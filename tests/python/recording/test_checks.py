@@ -247,14 +247,14 @@ def test_the_force_of_a_magnet_is_not_that_of_air(seed: int) -> None:
     assert not air_rows(repelling.position, repelling.force).any()
 
 
-def test_who_states_that_the_object_attracts_is_not_asked_for_its_sign() -> None:
+def test_a_stated_attraction_needs_no_other_sign() -> None:
     attracting = magnet(-1.0, 0)
-    asked = palpate.identify(attracting)
-    assert asked.verdict.level == "usable"
-    assert "if the object attracts the tool identify it with --below linear" in str(asked.verdict)
+    automatic = palpate.identify(attracting)
+    assert automatic.verdict.level == "usable"
+    assert "if the object attracts the tool identify it with --below linear" in str(automatic.verdict)
     stated = palpate.identify(attracting, below="linear")
     assert stated.verdict.level == "good"
-    np.testing.assert_array_equal(stated.force(attracting.position), asked.force(attracting.position))
+    np.testing.assert_array_equal(stated.force(attracting.position), automatic.force(attracting.position))
 
 
 def held(share: float) -> tuple[np.ndarray, np.ndarray]:

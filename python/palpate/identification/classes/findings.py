@@ -206,8 +206,8 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     mean_apart, mean_force = (np.bincount(place, values) / np.bincount(place) for values in (apart, force))
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
     rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
-    felt = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
-    if not felt and rms < best.error.rmse:
+    perceptible = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
+    if not perceptible and rms < best.error.rmse:
         return None
     amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
     if shift.late:
@@ -215,7 +215,7 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     causes = shifted_strokes(bool(data.parts), lag_s)
     return ShiftEffect(
         rms / spread,
-        felt,
+        perceptible,
         f"press and release are shifted against each other, by {amount}: without it the RMS error falls from "
         f"{unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} RMS, "
         f"at one place by {worst:.2g} just noticeable differences; {causes}",
@@ -357,7 +357,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     # One cause of an error hides the others.
     shift = effect_of_shift(selection)
     findings += (
-        ([usable(shift.sentence)] if shift and shift.felt else [])
+        ([usable(shift.sentence)] if shift and shift.perceptible else [])
         or log.findings
         or energy_findings(best)
         or limit_findings(best, options)

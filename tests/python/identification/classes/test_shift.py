@@ -44,11 +44,11 @@ def true_error(model: palpate.Model) -> float:
 def test_the_error_contains_the_shift_of_the_strokes(shift: float) -> None:
     model = palpate.identify(recorded(shift))
     assert 0.7 < model.notes["shift_nrmse"] / true_error(model) < 1.5
-    said = f"{model.notes['identification']} {model.verdict}"
-    found = re.search(r"press and release are shifted against each other, by (\S+?):", said)
+    message = f"{model.notes['identification']} {model.verdict}"
+    found = re.search(r"press and release are shifted against each other, by (\S+?):", message)
     assert found
     assert float(found[1]) == pytest.approx(shift, rel=0.5)
-    assert "mount the object without backlash, or try --force-late-s" in said
+    assert "mount the object without backlash, or try --force-late-s" in message
 
 
 @pytest.mark.parametrize("seed", sampled(range(6), 0))
