@@ -124,7 +124,7 @@ class IdentifyOptions:
     the force repeats, such as one revolution of a knob. The search needs inputs="auto" and two periods in
     one direction, or an angle that closes a revolution."""
     below: str = "auto"
-    """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves;
+    """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves.
     linear continues straight, because the object holds or attracts the tool. auto is free, unless the
     recording shows that the object pulls the tool."""
     above: str = "linear"
