@@ -126,7 +126,7 @@ class IdentifyOptions:
     below: str = "auto"
     """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves.
     linear continues straight, because the object holds or attracts the tool. auto is free, unless the
-    recording shows that the object pulls the tool."""
+    recording shows a pull."""
     above: str = "linear"
     """Force above the recorded positions: linear or free. linear continues straight, free falls to zero."""
     search: SearchOptions = field(default_factory=SearchOptions)
