@@ -162,14 +162,15 @@ class Velocity(ModelClass):
         both = select(over_both, self._selection.options)
         weight = below.fit_weight[rows]
         before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
+        constant = moving is not None and moving.damping is not None
+        compared = "constant damping" if constant else in_words(below.model_class)
         if shift := shift_of(self._selection, below):
             # A network that is grown without the shift explains as much as the velocity of a late force.
             moved = shift.without
             grown = self._selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
             before *= (grown.problem.rmse(grown.solution) / shift.before) ** 2
+            compared = f"{compared} with shifted strokes"
         share = 1.0 - after / before if before > 0.0 else 0.0
-        constant = moving is not None and moving.damping is not None
-        compared = "constant damping" if constant else in_words(below.model_class)
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
         bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
         decision = decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}")

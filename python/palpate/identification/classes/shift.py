@@ -90,7 +90,8 @@ def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
 
     unmoved = at(data.positions[:, 0])
     problem, free = refined(data.positions[:, 0], best.strokes or HysteresisInput(side, known))
-    if criterion_of(problem, free, "bic") + options.search.evidence > unmoved.criterion("bic"):
+    constrained = criterion_of(unmoved.problem, unmoved.solution, "bic")
+    if criterion_of(problem, free, "bic") + options.search.evidence > constrained:
         return None
     amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]
     near, late = min(amounts, key=lambda each: at(moved(*each)).rmse)
