@@ -180,12 +180,17 @@ def reference(rows: Rows) -> Model:
     return palpate.identify(rows.clean(), inputs=inputs, **options)
 
 
+def reported_error(model: Model) -> float:
+    """Returns the largest NRMSE that a model reports."""
+    return float(max(model.fit.nrmse, *(model.notes.get(name, 0.0) for name in REPORTED)))
+
+
 def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
     """Returns what the exact force shows about a model, compared with the reference fit `best`."""
     truth = Truth.of(rows)
     error, place, best_error = truth.error(model), truth.worst_place(model), truth.error(best)
     found, known = classes_of(model), resolvable(rows)
-    reported = max(model.fit.nrmse, *(model.notes.get(name, 0.0) for name in REPORTED))
+    reported = reported_error(model)
     return {
         "true_error": error,
         "reported_error": reported,

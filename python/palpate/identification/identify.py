@@ -77,8 +77,9 @@ def identify(
         every network that was considered. ``model.notes["model_selection"]`` holds one line for each model
         class, accepted or not; ``model.notes["rows"]`` sentences on rows that are not fitted, and
         ``model.notes["roles"]`` the number of rows of each role; ``model.notes["identification"]`` sentences
-        on constraints and the check of the band. ``model.band`` is the
-        range of force of a further recording.
+        on constraints and the check of the band; ``model.notes["shift_nrmse"]`` the NRMSE if press and
+        release are shifted against each other, else 0. ``model.band`` is the range of force of a further
+        recording.
 
     Raises
     ------

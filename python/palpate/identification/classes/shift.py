@@ -20,14 +20,15 @@ from ..search.evidence import Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
 
 DISTANCES = 2.0 ** np.arange(-10.0, -4.0, 0.5)
-"""Distances between press and release that are tried [travel], from the width of a click to a distance that
-is seen in a plot."""
+"""Distances between press and release that are tried [travel]: from those of measured domes to one beyond
+which a straight line with exchanged strokes looks shifted. One value in each octave misses a narrow click."""
 
 LAGS_S = LONGEST_LAG_S * 2.0 ** np.arange(-7.0, 0.5, 0.5)
 """Lags of the force that are tried [s]."""
 
 REFINEMENTS = 8
-"""Number of steps of the search between two of these values."""
+"""Number of steps of the search between two of these values. Without them the error left by a late force is
+so large that velocity explains it."""
 
 
 @dataclass(frozen=True)
