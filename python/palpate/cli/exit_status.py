@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Iterator
@@ -72,8 +73,9 @@ def interrupted_at_once() -> Iterator[None]:
     """Ends the process soon after Ctrl-C, also while a library computes.
 
     Python raises KeyboardInterrupt between two of its instructions, but one matrix or one file can take
-    seconds. If it is not raised soon, a thread ends the process. Results must be written inside `finishing`,
-    which ignores Ctrl-C.
+    seconds. If it is not raised soon, a thread ends the process. In a finalizer or a callback of a weak
+    reference it cannot be raised: Python prints it instead, which is suppressed here. Results must be written
+    inside `finishing`, which ignores Ctrl-C.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -94,13 +96,21 @@ def interrupted_at_once() -> Iterator[None]:
                 status.report(as_json=as_json)
                 os._exit(status.code)
 
+    printing = sys.unraisablehook
+
+    def unraisable(args: sys.UnraisableHookArgs) -> None:
+        if args.exc_type is not KeyboardInterrupt:
+            printing(args)
+
     watching = threading.Thread(target=watch, daemon=True)
     watching.start()
     before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    sys.unraisablehook = unraisable
     try:
         yield
     finally:
         over.set()
+        sys.unraisablehook = printing
         signal.set_wakeup_fd(before)
         os.write(writer, b"\0")
         watching.join()

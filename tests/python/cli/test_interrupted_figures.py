@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from models_by_hand import model_by_hand
 from palpate import Recording
+from palpate.cli.exit_status import interrupted_at_once
 from palpate.cli.main import main
 
 
@@ -88,3 +89,21 @@ def test_ctrl_c_while_the_demo_draws_ends_it_within_a_second(tmp_path: Path) -> 
     assert output == ""
     assert messages == "error: interrupted; nothing was written\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_in_a_finalizer_prints_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    printed: list[type[BaseException]] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda args: printed.append(args.exc_type))
+
+    class Finalized:
+        def __init__(self, error: BaseException) -> None:
+            self.error = error
+
+        def __del__(self) -> None:
+            raise self.error
+
+    with interrupted_at_once():
+        for error in (KeyboardInterrupt(), MemoryError()):
+            Finalized(error)
+    assert printed == [MemoryError]
