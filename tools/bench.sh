@@ -71,7 +71,6 @@ studies <<END
   identification/filters.py --json build/bench/filters.json
   identification/parsimony.py --json build/bench/parsimony.json
   identification/noise.py --json build/bench/noise.json
-  identification/force_lag.py --json build/bench/force_lag.json
   identification/real_data.py --json build/bench/real_data.json
   identification/dynamic.py --json build/bench/dynamic.json
   identification/repeats.py --json build/bench/repeats.json

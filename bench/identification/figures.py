@@ -3,8 +3,7 @@
 
 python bench/identification/figures.py build/bench --to docs
 
-Draws identification-parameters.png, -time.png, -filters.png, -several.png, -lag.png and -repeats.png to
-FOLDER/figures.
+Draws identification-parameters.png, -time.png, -filters.png, -several.png and -repeats.png to FOLDER/figures.
 Writes the tables of FOLDER/identification.md if that page exists. A study that did not run keeps its table.
 """
 
@@ -239,35 +238,6 @@ def noise(rows: Sequence[Row]) -> str:
     )
 
 
-def lags(results: Mapping[str, Sequence[Row]]) -> str:
-    """Returns a table of the errors of estimated lags, by object and by noise level."""
-
-    def text(value: float) -> str:
-        return "" if math.isnan(value) else f"{value:.3f}"
-
-    return markdown_table(
-        (
-            "simulated recordings",
-            "recordings",
-            "lag known",
-            "bias [ms]",
-            "RMS error [ms]",
-            "half interval [ms]",
-            "inside",
-        ),
-        [
-            (
-                row["name"],
-                str(row["recordings"]),
-                str(row["known"]),
-                *(text(row[key]) for key in ("bias_ms", "rms_error_ms", "half_width_ms")),
-                f"{100.0 * row['inside'] / row['known']:.0f} %" if row["known"] else "",
-            )
-            for row in results["groups"]
-        ],
-    )
-
-
 TABLES: Mapping[str, Callable[[Any], str]] = {
     "real_data": measured_objects,
     "crossing": crossings,
@@ -278,7 +248,6 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
     "published": repeats.published_table,
     "several_inputs": several_inputs.table,
     "noise": noise,
-    "force_lag": lags,
 }
 """Names of the tables whose studies may not have run"""
 
@@ -369,47 +338,6 @@ def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
         axes.figure.legend(frameon=False, loc="outside lower center", ncols=1)
 
 
-def draw_lags(path: Path, results: Mapping[str, Sequence[Row]]) -> None:
-    """Draws errors of estimated lags over the true lag (left) and the intervals of measured domes (right)."""
-    draws, domes = [row for row in results["draws"] if row["known"]], results["domes"]
-    with figure_file(path, height_inches=3.2, columns=2) as (simulated, measured):
-        for level, (marker, color) in zip(
-            sorted({row["noise"] for row in draws}), METHOD_STYLES[::2], strict=False
-        ):
-            rows = [row for row in draws if row["noise"] == level]
-            true = [1e3 * row["true_s"] for row in rows]
-            error = [1e3 * (row["late_s"] - row["true_s"]) for row in rows]
-            half = [500.0 * (row["upper_s"] - row["lower_s"]) for row in rows]
-            simulated.errorbar(
-                true,
-                error,
-                half,
-                linestyle="none",
-                marker=marker,
-                markersize=3.0,
-                color="black",
-                ecolor="0.7",
-                elinewidth=0.6,
-                markerfacecolor=color,
-                markeredgewidth=0.5,
-                label=f"noise {100 * level:g} %",
-            )
-        simulated.set_yscale("symlog", linthresh=0.1)
-        simulated.set_xlabel("true lag [ms]")
-        simulated.set_ylabel("estimated minus true lag [ms]")
-        grid(simulated)
-        for place, row in enumerate(row for row in domes if not math.isnan(row["late_s"])):
-            lower, late, upper = (1e3 * row[key] for key in ("lower_s", "late_s", "upper_s"))
-            measured.plot([lower, upper], [place, place], color="0.6", linewidth=1.0)
-            face = "black" if row["known"] else "white"
-            measured.plot(late, place, "ko", markersize=3.0, markerfacecolor=face, markeredgewidth=0.6)
-        measured.set_yticks([])
-        measured.set_ylabel("rubber domes; top: all together")
-        measured.set_xlabel("lag [ms]")
-        grid(measured)
-        simulated.figure.legend(frameon=False, loc="outside lower center", ncols=3, fontsize=6.0)
-
-
 def decades(values: Iterable[float]) -> tuple[float, float]:
     """Returns the limits of an axis: the nearest powers of ten below and above all drawn values."""
     exponents = [math.log10(value) for value in values]
@@ -450,8 +378,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 several_inputs.draw(figures / "identification-several.png", study[0])
             if name == "repeats":
                 repeats.draw(figures / "identification-repeats.png", study[0])
-            if name == "force_lag":
-                draw_lags(figures / "identification-lag.png", study[0])
     print(f"wrote the figures of identification to {figures}")
     fill_tables(options.to / "identification.md", tables)
 

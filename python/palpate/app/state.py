@@ -105,9 +105,6 @@ class OptionTable:
         option = self._by_flag[flag]
         return 0 if option.is_flag else option.nargs
 
-    def _help(self, flag: str) -> str:
-        return re.sub(r"\W", " ", self._by_flag[flag].help or "") if flag in self else ""
-
     def parsed(self, words: Sequence[str]) -> list[Option]:
         """Returns the options at the start of words; ends at the first word that belongs to none of them."""
         found, at = list[Option](), 0
@@ -134,14 +131,12 @@ class OptionTable:
         """Returns the options with values that a sentence advises; those that follow each other are one cure.
 
         An option whose value is a placeholder (``START:STOP``) is left out, because only the user knows the
-        value. A missing value is "auto" if the help of the option has this word.
+        value.
         """
         found: list[tuple[Option, ...]] = []
         at = 0
         while (start := _FLAG.search(sentence, at)) is not None:
             options = self.parsed(_words(sentence[start.start() :]))
-            if not options and "auto" in self._help(start[0]).split():
-                options = [(start[0], "auto")]
             complete = [each for each in options if not any(map(_PLACEHOLDER.fullmatch, each[1:]))]
             if options and complete == options and tuple(options) not in found:
                 found.append(tuple(options))

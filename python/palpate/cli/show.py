@@ -80,7 +80,6 @@ def _voices(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     show_default=True,
     help="Numbers of voices in the figure of --plot-frame, at most four; the grid has one voice.",
 )
-@click.option("--lag", is_flag=True, help="Estimate the lag of the force of a recording.")
 @json_option
 @reading_options
 def show(
@@ -91,7 +90,6 @@ def show(
     a0: float,
     b0: float,
     voices: tuple[int, ...],
-    lag: bool,
     as_json: bool,
     reading: ReadingOptions,
 ) -> None:
@@ -106,10 +104,8 @@ def show(
     if is_recording(file):
         if other_file is not None:
             raise InputError(f"--beside compares two models, but {file} is a recording: identify it first")
-        show_recording(file, reading, lag=lag, plot=plot, frame=frame, as_json=as_json)
+        show_recording(file, reading, plot=plot, frame=frame, as_json=as_json)
         return
-    if lag:
-        raise InputError(f"--lag is an option for recordings, but {file} is a model")
     _refuse_reading_options(file, reading)
     model_file, model = file, load_model(file)
     if other_file is not None:

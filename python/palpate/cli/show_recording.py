@@ -40,7 +40,6 @@ def show_recording(
     file: Path,
     reading: ReadingOptions,
     *,
-    lag: bool,
     plot: Path | None,
     frame: FrameFigure | None,
     as_json: bool,
@@ -64,13 +63,11 @@ def show_recording(
     with finishing():
         write_figures()
         if as_json:
-            found = {"force_lag": recording.force_lag.record()} if lag else {}
             record = _record(file, recording, strokes) | {"roles": roles}
-            print_json(record | found | {"verdict": str(verdict)})
+            print_json(record | {"verdict": str(verdict)})
         else:
             print_verdict(verdict)
-            estimated = {"force lag": str(recording.force_lag)} if lag else {}
-            print_numbers(_summary(recording, strokes, roles) | estimated)
+            print_numbers(_summary(recording, strokes, roles))
             for note in notes:
                 print_paragraph(note, indent="  ")
         end_with(verdict)
@@ -110,7 +107,7 @@ def _summary(recording: Recording, strokes: dict[str, int] | None, roles: dict[s
         if len(cycles := cycles_of(recording)) > 1:
             first, last = (f"(rows {each.start} to {each.stop - 1})" for each in (cycles[0], cycles[-1]))
             stroke_text += f"; --part 'cycle N' reads one: cycle 1 {first} to cycle {len(cycles)} {last}"
-    missing = ["no time, so no velocity, damping, memory or lag"] if recording.time is None else []
+    missing = ["no time, so no velocity, damping, or memory"] if recording.time is None else []
     missing += ["no direction, so no hysteresis"] if strokes is None else []
     return {
         "rows": f"{len(recording)} of {file_rows} in the file: {counts_text(roles)}",

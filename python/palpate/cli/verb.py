@@ -119,15 +119,6 @@ def _zero(
     return value if value == "air" else _row_range(ctx, param, value)
 
 
-def _lag(ctx: click.Context, param: click.Parameter, value: str) -> float | str:
-    """Parses a number of seconds, or the word auto."""
-    try:
-        return value if value == "auto" else float(value)
-    except ValueError:
-        message = f"{value!r} must be a number of seconds, such as 0.025, or auto"
-        raise click.BadParameter(message, ctx, param) from None
-
-
 @dataclass(frozen=True)
 class ReadingOptions:
     """Options for reading the recordings of one run."""
@@ -181,9 +172,7 @@ _READING = options(
         callback=lambda ctx, param, names: names or None,
         help=f"{_about('part')} Repeatable.",
     ),
-    expert_option(
-        "--force-late-s", metavar="SECONDS", callback=_lag, default="0.0", help=_about("force_late_s")
-    ),
+    expert_option("--force-late-s", metavar="SECONDS", type=float, default=0.0, help=_about("force_late_s")),
     expert_option(
         "--columns",
         metavar="NAME,NAME,...",

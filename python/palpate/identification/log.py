@@ -128,8 +128,8 @@ def lowered(quantity: str, decrease: float) -> str:
 def shifted_strokes(timed: bool, lag_s: float | None = None) -> str:
     """Returns the causes and cures of strokes that are shifted against each other, for a recording with or
     without time; `lag_s` is the lag of the force, if it is known."""
-    value = "" if lag_s is None else f" {lag_s:.3g}"
-    cure = f"try --force-late-s{value}" if timed else "record the time"
+    value = "SECONDS, the delay of the force" if lag_s is None else f"{lag_s:.3g}"
+    cure = f"give --force-late-s {value}" if timed else "record the time"
     return f"backlash or a late force shifts the strokes so: mount the object without backlash, or {cure}"
 
 

@@ -474,7 +474,10 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
 
 LEAST_SPEED_SPREAD = 0.19
 """Least spread of speeds at which slow and fast strokes are compared [-]: that of speeds spread evenly from 1
-to 2. With a smaller spread damping cannot be distinguished from friction, nor a lag from hysteresis."""
+to 2. With a smaller spread damping cannot be distinguished from friction."""
+
+LONGEST_LAG_S = 0.1
+"""Longest lag of a force that is searched, and advised to be corrected [s]"""
 
 
 def spread_of_speeds(velocity: Float1D) -> float:

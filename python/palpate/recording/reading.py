@@ -56,7 +56,7 @@ def read_recording(
     rows: tuple[int | None, int | None] | None = None,
     leave_out: Sequence[tuple[int | None, int | None]] = (),
     zero: tuple[int | None, int | None] | Literal["air"] | None = None,
-    force_late_s: float | Literal["auto"] = 0.0,
+    force_late_s: float = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
     part: PartNames | None = None,
 ) -> Recording:
@@ -102,10 +102,9 @@ def read_recording(
     zero : (start, stop) or "air", optional
         Rows without contact; their mean force is subtracted. The range is counted as `rows`; "air" are the
         rows before the contact.
-    force_late_s : float or "auto"
-        Delay of the recorded force [s], or auto; needs time. Every force is moved to its position, for
-        example if the converter of a load cell averages. "auto" finds the delay in the recording
-        (:attr:`palpate.Recording.force_lag`) and refuses a recording that does not determine it.
+    force_late_s : float
+        Delay of the recorded force [s]; needs time. Every force is moved to its position, for example if the
+        converter of a load cell averages.
     invalid : {"refuse", "drop"}
         Refuse the file, or drop rows without a number. An infinite number, a missing direction, or a time
         that does not increase is treated in the same way. The error names the row; dropped rows are counted.

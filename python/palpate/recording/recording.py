@@ -21,7 +21,6 @@ from .checks import quality_findings
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
-from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
 from .motion import cycles_of
 from .roles import Informative
@@ -324,30 +323,20 @@ class Recording:
         source = replace(part.source, files=tuple(f"{file}, {name}" for file in part.source.files))
         return replace(part, source=source, notes=(*self.notes, f"{name} of {len(cycles)}"))
 
-    @property
-    def force_lag(self) -> ForceLag:
-        """Lag of the force behind its position, with a 95 % confidence interval, from strokes at different
-        speeds or from turns"""
-        return lag_of([self])
-
-    def with_force_earlier(self, late_s: float | Literal["auto"]) -> Recording:
+    def with_force_earlier(self, late_s: float) -> Recording:
         """Returns the recording corrected for a force that was recorded late_s [s] after its position.
 
         At a reversal on a steep force, a late force is larger in the release than in the press, which a
         passive object cannot do. Positions, directions and further inputs are shifted by late_s; the first
-        rows, whose shifted position was not recorded, are removed. "auto" uses :attr:`force_lag`. A lag whose
-        confidence interval contains 0 is not corrected.
+        rows, whose shifted position was not recorded, are removed.
 
         Raises
         ------
         InputError
-            The recording has no time, late_s is negative or longer than the recording, or "auto" is given and
-            the recording does not determine the lag.
+            The recording has no time, or late_s is negative or longer than the recording.
         """
         if self.time is None:
             raise InputError("late_s needs a recording with a column of time (--time NAME)")
-        if isinstance(late_s, str):
-            return self._with_found_lag(late_s)
         time = self.time
         late_s = real_of("late_s", late_s)
         shifted_time = time - late_s
@@ -372,17 +361,6 @@ class Recording:
             corrected_lag_s=self.corrected_lag_s + late_s,
         )
         return shifted._rows(rows)
-
-    def _with_found_lag(self, word: str) -> Recording:
-        if word != "auto":
-            raise InputError(f"late_s is {word!r}; it must be a number of seconds or 'auto'")
-        found = self.force_lag
-        if not found.known:
-            raise InputError(f"the lag of the force is not known: {found.reason}; {UNKNOWN_CURE}")
-        if not found.is_late:
-            return replace(self, notes=(*self.notes, f"{found}: not corrected"))
-        noted = replace(self, notes=(*self.notes, str(found)))
-        return noted.with_force_earlier(round(found.late_s, LAG_DIGITS))
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
         """Writes the recording as CSV, or as MCAP if the name ends in ``.mcap``.

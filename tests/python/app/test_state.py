@@ -21,7 +21,7 @@ IDENTIFY = CommandLine.identify
         ("for a latch or a stored spring, --no-hysteresis-nonnegative",
          [(("--no-hysteresis-nonnegative",),)]),
         ("if the comma is the decimal mark, add: --decimal ','", [(("--decimal", ","),)]),
-        ("mount the object without backlash, or try --force-late-s", [(("--force-late-s", "auto"),)]),
+        ("mount the object without backlash, or give --force-late-s SECONDS, the delay of the force", []),
         ("Give --zero START:STOP, the rows without contact", []),
         ("name its column with --time NAME", []),
         ("render with --structure direct, or write -o OUT.json", []),

@@ -381,29 +381,28 @@ def test_a_file_read_by_parts_belongs_to_no_object(folder: Path, capsys: pytest.
     assert "--object needs all rows at once" in capsys.readouterr().err
 
 
-def test_the_lag_of_the_force_is_printed_and_corrected_only_on_request(
+def test_a_late_force_is_found_and_its_correction_improves_the_model(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    time = 1e-3 * np.arange(4000)
+    time, random = 1e-3 * np.arange(6000), np.random.default_rng(0)
+    speed = 2.0 * np.pi * np.where(time < 3.0, 2.0 / 3.0, 4.0 / 3.0)
+    position = 2e-3 * (1.0 - np.cos(1e-3 * np.cumsum(speed)))
+    wall = 300.0 * position + 4000.0 * np.maximum(position - 2.4e-3, 0.0)
+    force = np.interp(time - 0.02, time, wall) + random.normal(0.0, 0.005, len(time))
+    Recording.from_arrays(position, force, time).write(folder / "a.csv")
 
-    def position(at: np.ndarray) -> np.ndarray:
-        return 0.5 - 0.4 * np.cos(2.0 * np.pi * (0.5 * at + 0.15 * at**2))
+    def printed(*options: str) -> str:
+        assert main(["identify", "a.csv", "-o", "m.json", *options]) == 0
+        return " ".join(capsys.readouterr().out.split())
 
-    late = position(time - 0.02)
-    force = 0.3 * late + 0.1 * np.sin(12.0 * np.pi * late)
-    force = force + np.random.default_rng(1).normal(0.0, 2e-3, len(force))
-    Recording.from_arrays(position(time), force, time).write(folder / "a.csv")
-    settings = ["-o", "m.json", "--inputs", "position", "--max-wavelets", "8"]
-    main(["identify", "a.csv", *settings])
-    assert "force lag" not in capsys.readouterr().out
-    main(["show", "a.csv", "--lag"])
-    assert "force lag the force is 20 ms late (95 %: " in " ".join(capsys.readouterr().out.split())
-    main(["identify", "a.csv", *settings, "--force-late-s", "auto"])
-    captured = capsys.readouterr()
-    assert "the force is 20 ms late (95 %: " in captured.err
-    assert "force lag 20 ms corrected" in " ".join(captured.out.split())
-    assert main(["identify", "a.csv", *settings, "--force-late-s", "soon"]) == 2
-    assert "must be a number of seconds, such as 0.025, or auto" in capsys.readouterr().err
+    advised = re.search(r"press and release are shifted .* give --force-late-s (\d\S+) ", printed())
+    assert advised
+    assert float(advised[1]) == pytest.approx(0.02, rel=0.05)
+    corrected = printed("--force-late-s", advised[1])
+    assert corrected.startswith("verdict: good")
+    assert f"force lag {1e3 * float(advised[1]):.3g} ms corrected" in corrected
+    assert main(["identify", "a.csv", "-o", "m.json", "--force-late-s", "soon"]) == 2
+    assert "'soon' is not a valid float" in capsys.readouterr().err
 
 
 def knob_file(path: Path) -> Path:
@@ -471,14 +470,3 @@ def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
         "2 of 299 rows are not fitted: 2 wait in air\n"
     ) in printed
     assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n" in printed
-
-
-def test_identify_does_not_estimate_the_lag(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sample_recording(3, 5.0).write(folder / "a.csv")
-
-    def refuse(_: object) -> None:
-        raise AssertionError("the lag was estimated")
-
-    monkeypatch.setattr("palpate.recording.recording.lag_of", refuse)
-    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
-    assert main(["show", "a.csv", "--lag"]) != 0

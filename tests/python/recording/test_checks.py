@@ -220,11 +220,9 @@ def sign_sentence(force_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> s
     return sentence
 
 
-def test_a_late_force_is_advised_to_be_moved_by_its_lag() -> None:
+def test_a_late_force_is_advised_to_be_moved() -> None:
     late = sign_sentence(lambda time, _: 1.0 - np.cos(2.0 * np.pi * 0.5 * (time - 0.025)))
-    advised = re.search(r"if the force was recorded late, --force-late-s (\S+);", late)
-    assert advised
-    assert float(advised[1]) == pytest.approx(0.025, rel=0.4)
+    assert "if the force was recorded late, give its delay, --force-late-s SECONDS;" in late
 
 
 def test_a_friction_of_the_wrong_sign_is_not_advised_to_be_late() -> None:

@@ -181,7 +181,7 @@ OPTIONS = st.fixed_dictionaries(
         "negate": st.lists(used, max_size=2),
         "rows": st.tuples(ends, ends),
         "zero": st.tuples(ends, ends),
-        "force_late_s": st.sampled_from([0.001, 0.1, -0.1, 100.0, float("nan"), "auto"]),
+        "force_late_s": st.sampled_from([0.001, 0.1, -0.1, 100.0, float("nan")]),
         "invalid": st.sampled_from(["refuse", "drop", "keep"]),
     },
 )

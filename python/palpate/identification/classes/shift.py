@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from ..._typing import Float1D
-from ...recording.lag import LONGEST_LAG_S
+from ...recording.motion import LONGEST_LAG_S
 from ..data.strokes import HysteresisInput
 from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ...verdict import FORCE_FLOOR, Finding, no, usable
 from ..contact import air_rows
 from ..conversion import mirror_notes
-from ..lag import LONGEST_LAG_S
-from ..motion import LEAST_STROKE_ROWS
+from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S
 from .cells import Checked, inner_range
 
 if TYPE_CHECKING:
@@ -48,10 +47,8 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
         large = abs(mean) > FORCE_FLOOR * float(np.abs(f).max())
         is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
     if is_loop and mean < 0.0:
-        lag_s = _lag_of(recording, -mean)
-        late = (
-            f"; if the force was recorded late, --force-late-s {lag_s:.2g}" if lag_s <= LONGEST_LAG_S else ""
-        )
+        is_late = _lag_of(recording, -mean) <= LONGEST_LAG_S
+        late = "; if the force was recorded late, give its delay, --force-late-s SECONDS" if is_late else ""
         return [
             usable(
                 f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "

@@ -220,7 +220,7 @@ def test_few_rows_are_named_as_the_cause_when_only_rows_left_out_do_not_fit() ->
 
 @pytest.mark.parametrize(
     ("timed", "cure"),
-    sampled([(False, "record the time"), (True, "try --force-late-s")], (False, "record the time")),
+    sampled([(False, "record the time"), (True, "give --force-late-s")], (False, "record the time")),
 )
 def test_strokes_shifted_by_backlash_are_not_only_called_late(timed: bool, cure: str) -> None:
     x = np.r_[np.linspace(0.0, 4.0, 800), np.linspace(4.0, 0.0, 800)]

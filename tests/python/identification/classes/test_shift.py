@@ -48,7 +48,7 @@ def test_the_error_contains_the_shift_of_the_strokes(shift: float) -> None:
     found = re.search(r"press and release are shifted against each other, by (\S+?):", message)
     assert found
     assert float(found[1]) == pytest.approx(shift, rel=0.5)
-    assert "mount the object without backlash, or try --force-late-s" in message
+    assert "mount the object without backlash, or give --force-late-s" in message
 
 
 @pytest.mark.parametrize("seed", sampled(range(6), 0))
