@@ -61,7 +61,7 @@ moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo m
 module_names := find python -name '*.py' | LC_ALL=C sort
 renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
-.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench bench-sample figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-cpp test-python fuzz examples test-packages coverage mutants bench bench-sample figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved renamed
 
 help:
@@ -110,11 +110,10 @@ demo: $(stamps)/core
 	@echo "The pictures are in demo/. Now type:  . .venv/bin/activate"
 	@echo "and then:  palpate identify demo/sample-1.csv -o knob.json --plot knob.png"
 
-# The linters and the compilers share the processors. The Python tests run last, so that their summary is at the end of
-# the output.
+# The linters use one processor, so the C++ tests run at the same time. The Python tests run last, so that their summary
+# is at the end of the output.
 test: | setup
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control cpp-tests
-	$(MAKE) --no-print-directory test-cpp
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
 	$(MAKE) --no-print-directory test-python
 
 # Files keep their order, because the longest ones contain few tests and would start last. One process more than
@@ -128,11 +127,6 @@ control: $(stamps)/control
 	$(alone) cmake --preset control >/dev/null
 	$(alone) cmake --build --preset control
 	ln -sf ../../build/control/palpate-control .venv/bin/
-
-# The programs of the C++ tests.
-cpp-tests: setup
-	cmake --preset dev >/dev/null
-	cmake --build --preset dev
 
 # The examples in C++, which the Python tests run.
 examples: setup
