@@ -21,7 +21,6 @@ from ..data.rows import period_notes
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
-from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection
@@ -146,6 +145,13 @@ def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
     return place if side is None else place + PLACES * (side < 0)
 
 
+def _means(place: NDArray[np.intp], weight: Float1D, *values: Float1D) -> list[Float1D]:
+    """Returns the weighted means (2 PLACES,) of values (n,) in each place and direction; 0 without rows."""
+    total = np.bincount(place, weight, 2 * PLACES)
+    total = np.where(total > 0.0, total, 1.0)
+    return [np.bincount(place, weight * each, 2 * PLACES) / total for each in values]
+
+
 def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
     hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
@@ -155,10 +161,7 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     data, residual, weight = best.data, best.residual[rows], best.settled.weight[rows]
     group = _places(data.box[rows], None if best.side is None else best.side[rows])
     count = np.bincount(group, weight, 2 * PLACES)
-    mean, force, square = (
-        np.bincount(group, weight * values, 2 * PLACES) / np.where(count > 0.0, count, 1.0)
-        for values in (residual, data.force[rows], residual**2)
-    )
+    mean, force, square = _means(group, weight, residual, data.force[rows], residual**2)
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1.0, 1.0))
     jnd = force_jnd(force, _floor(best) or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
@@ -203,7 +206,7 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     force = np.concatenate([true_middle + true_half, true_middle - true_half])
     apart = np.concatenate([middle + half, middle - half]) - force
     place = _places(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
-    mean_apart, mean_force = (np.bincount(place, values) / np.bincount(place) for values in (apart, force))
+    mean_apart, mean_force = _means(place, np.ones(len(place)), apart, force)
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
     rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
     perceptible = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
@@ -211,7 +214,7 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
         return None
     amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
     if shift.late:
-        amount, lag_s = f"a force that is {1e3 * shift.amount:.3g} ms late", shift.amount
+        amount, lag_s = f"a force that is about {1e3 * shift.amount:.3g} ms late", shift.amount
     causes = shifted_strokes(bool(data.parts), lag_s)
     return ShiftEffect(
         rms / spread,
@@ -233,8 +236,7 @@ def energy_findings(best: Candidate) -> list[Finding]:
     there, back = there[known], back[known]
     loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
     place = _places(data.box[rows][known], None)
-    count = np.maximum(np.bincount(place, minlength=PLACES), 1)
-    mean, force = (np.bincount(place, values, PLACES) / count for values in (loop, data.force[rows][known]))
+    mean, force = _means(place, np.ones(len(place)), loop, data.force[rows][known])
     gained = -mean / force_jnd(force, _floor(best) or 1.0)
     worst = int(np.argmax(gained))
     if gained[worst] <= MOST_JND:
@@ -257,15 +259,11 @@ def drift_findings(best: Candidate) -> list[Finding]:
         return []
     rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
     weight, group = best.settled.weight[rows], _places(data.box[rows], direction[rows])
-    total = np.maximum(np.bincount(group, weight), TINY)
-
-    def within(values: Float1D) -> Float1D:
-        """Returns the values minus their mean in each place and direction."""
-        return np.asarray(values - (np.bincount(group, weight * values) / total)[group])
-
     stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
     middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
-    moment, residual = within(middle), within(best.residual[rows])
+    values = middle, best.residual[rows]
+    means = _means(group, weight, *values)
+    moment, residual = (each - mean[group] for each, mean in zip(values, means, strict=True))
     squares = float(weight @ moment**2)
     if not squares > np.finfo(float).eps * len(rows):
         return []
