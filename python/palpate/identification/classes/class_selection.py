@@ -64,8 +64,6 @@ class ClassSelection:
         Model classes in the order in which they are tried, the simplest first.
     cells : int
         Largest number of distinct positions; with more, positions are gathered in cells.
-    previous : ClassSelection, optional
-        Model selection over nearly the same rows: growth starts with its final wavelets.
     """
 
     def __init__(
@@ -74,12 +72,9 @@ class ClassSelection:
         options: IdentifyOptions,
         classes: Sequence[type[ModelClass]],
         cells: int,
-        previous: ClassSelection | None = None,
     ) -> None:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
-        self.log: Log = Log(list(previous.log.path) if previous else [])
-        self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
-        """Wavelets with which the growth of a network starts, by the name of the model class"""
+        self.log = Log()
         self.samples = Samples(data, options, cells)
         self.judge = Judge(self.samples, options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
@@ -101,16 +96,9 @@ class ClassSelection:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
 
-    def repeated(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> ClassSelection:
-        """Repeats this model selection on changed rows. If `keep` is True, the growth of each network starts
-        with the final wavelets of this model selection."""
-        return ClassSelection(
-            data,
-            self.options,
-            self.classes,
-            cells or self.cells,
-            self if keep else None,
-        )
+    def repeated(self, data: Rows, *, cells: int | None = None) -> ClassSelection:
+        """Repeats this model selection on changed rows."""
+        return ClassSelection(data, self.options, self.classes, cells or self.cells)
 
     @cached_property
     def rows(self) -> Compressed:
@@ -297,9 +285,7 @@ class Network(ModelClass):
         if below.problem.n_parameters(Basis.empty(below.problem.dimension), more=1) >= below.problem.samples:
             return below
         problem = selection.samples.problem(selection.rows)
-        start = selection.start_basis.get(self.name, Basis.empty(problem.dimension))
-        grown = selection.grown(problem, start, self.name, most)
-        selection.start_basis[self.name] = grown.solution.basis
+        grown = selection.grown(problem, Basis.empty(problem.dimension), self.name, most)
         found = selection.candidate(self.name, grown.problem, grown.solution, grown.stop_reason)
         return selection.judge.better(below, selection.constrained(found))
 

@@ -144,7 +144,6 @@ class Hysteresis(ModelClass):
         judge, named = self._selection.judge, self._named
         if not named and not judge.accepts(below, free):
             return judge.better(below, free)
-        self._selection.start_basis[self.name] = free.solution.basis
         kept = self._selection.constrained(free)
         if named:
             self._report_sign(kept, kept, free)
@@ -170,13 +169,12 @@ class Hysteresis(ModelClass):
         assert found.strokes is not None
         selection, samples = self._selection, self._selection.samples
         strokes, most = found.strokes, selection.options.max_wavelets
-        basis = selection.start_basis.get(self.name, found.solution.basis)
-        has_start, complete = self.name in selection.start_basis, False
+        basis, searched, complete = found.solution.basis, False, False
         for _ in range(MOST_RADIUS_SEARCHES):
             before = strokes
             if play and (self._named or selection.judge.accepts(below, found)):
                 strokes = self._weighted(play.with_best_radius(strokes, basis), basis)
-                basis, has_start = (basis if has_start else Basis.empty(1)), True
+                basis, searched = (basis if searched else Basis.empty(1)), True
             if complete and strokes is before:
                 break
             rows = samples.rows(strokes)

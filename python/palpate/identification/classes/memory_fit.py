@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..._core.model import ForceModel, play, stretches
 from ..._typing import Float1D, Float2D
 from ..data.compression import HELD_OUT_EVERY
-from ..data.limits import LEAST_INDEPENDENT_SHARE, independent_share
+from ..data.limits import independent_share
 from ..search.evidence import CRITERIA
 
 MOST_ROUGHNESS = 1e-3
@@ -279,9 +279,7 @@ class MemoryFit:
         residual = self.error(shape)
         power = float(residual @ residual) + np.finfo(float).tiny
         rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
-        return max(
-            LEAST_INDEPENDENT, LEAST_INDEPENDENT_SHARE * len(residual), independent_share(rho) * len(residual)
-        )
+        return max(LEAST_INDEPENDENT, independent_share(rho) * len(residual))
 
     def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
         """Returns the criterion of a memory."""

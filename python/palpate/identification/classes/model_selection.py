@@ -9,7 +9,6 @@ import numpy as np
 
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.limits import (
-    LEAST_INDEPENDENT_SHARE,
     MOST_COMPARED_ROWS,
     correlation,
     independent_share,
@@ -24,9 +23,6 @@ from .findings import USABLE_NRMSE
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
 from .shift import shift_of
-
-MOST_DYNAMIC_SELECTIONS = 2
-"""Number of times that the model is selected again, each time with better values of damping and mass."""
 
 SETTLED_INDEPENDENT_RATIO = 0.8
 """Ratio of the new to the previous share of independent rows, above which the model selection is not repeated
@@ -70,7 +66,7 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
         residual = (data.force[rows] - best.force_at(rows))[used[rows]]
         found.append((innovation_deviance(residual, best.n_parameters, least), current))
         share = independent_share(correlation(residual))
-        if share > SETTLED_INDEPENDENT_RATIO * limits.independent or share < LEAST_INDEPENDENT_SHARE:
+        if share > SETTLED_INDEPENDENT_RATIO * limits.independent:
             break
         repeated = current.repeated(replace(current.data, limits=replace(limits, independent=share)))
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
@@ -98,27 +94,22 @@ class MassAndDamping(ModelClass):
         assert motion is not None
         values, decisions = motion.accepted(below.solution.basis, below.strokes)
         selection.log.decisions.extend(decisions)
-        best, current, names = below, selection, tuple(values)
-        for _ in range(MOST_DYNAMIC_SELECTIONS):
-            if not values or min(values.values()) <= 0.0:
-                break  # a passive object has no negative mass or damping: keep the previous values
-            moving = motion.moving(values)
-            weight = moving.known if data.weight is None else moving.known * data.weight
-            still = replace(data, force=data.force - moving.force, weight=weight)
-            current = current.repeated(still, keep=current is not selection)
-            best = replace(
-                current.best,
+        if not values or min(values.values()) <= 0.0:
+            return below  # a passive object has no negative mass or damping
+        moving = motion.moving(values)
+        weight = moving.known if data.weight is None else moving.known * data.weight
+        again = selection.repeated(replace(data, force=data.force - moving.force, weight=weight))
+        note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
+        selection.log.follow(again.log, [note])
+        return selection.recorded(
+            replace(
+                again.best,
                 model_class="velocity" if moving.mass is None else "mass and damping",
                 data=data,
-                n_parameters=current.best.n_parameters + len(values),
+                n_parameters=again.best.n_parameters + len(values),
                 moving=moving,
             )
-            values = motion.values(best.solution.basis, best.strokes, names)
-        if best is below:
-            return below
-        note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."
-        selection.log.follow(current.log, [note])
-        return selection.recorded(best)
+        )
 
 
 class Velocity(ModelClass):
