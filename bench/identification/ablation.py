@@ -56,8 +56,8 @@ FILES = 4
 LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
-SHOWN = (10280, 10388, 10441)
-"""Draws that show a rule: a late force on a wall, a magnet, backlash of a dome"""
+SHOWN = (10280, 10363, 10388, 10441)
+"""Draws that show a rule: a late force on a wall, a second zero of a pedal, a magnet, backlash of a dome"""
 
 CHANGED_RATIO = 1.02
 """Ratio of two errors, of the same class and size, above which a fit has changed"""
@@ -266,7 +266,6 @@ RULES = (
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
     Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
-    Rule("damping is fitted again", f"{CLASSES}.model_selection", "MOST_DYNAMIC_SELECTIONS", 1),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_residual", lambda of: of.best.residual),
     *map(without_check, checks.CHECKS),

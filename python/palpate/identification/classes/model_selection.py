@@ -9,6 +9,7 @@ import numpy as np
 
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.limits import (
+    LEAST_INDEPENDENT_SHARE,
     MOST_COMPARED_ROWS,
     correlation,
     independent_share,
@@ -66,7 +67,7 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
         residual = (data.force[rows] - best.force_at(rows))[used[rows]]
         found.append((innovation_deviance(residual, best.n_parameters, least), current))
         share = independent_share(correlation(residual))
-        if share > SETTLED_INDEPENDENT_RATIO * limits.independent:
+        if share > SETTLED_INDEPENDENT_RATIO * limits.independent or share < LEAST_INDEPENDENT_SHARE:
             break
         repeated = current.repeated(replace(current.data, limits=replace(limits, independent=share)))
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."

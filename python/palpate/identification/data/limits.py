@@ -46,6 +46,10 @@ LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
 as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
 
+LEAST_INDEPENDENT_SHARE = 0.02
+"""Least share of the rows that count as independent if the noise of successive rows is correlated [-]. With a
+smaller share the residual is not noise but memory or drift."""
+
 MOST_COMPARED_ROWS = 20_000
 """Largest number of rows from which two models are compared or a correlation is computed: a share of their
 squared error is then known to 1 %."""
