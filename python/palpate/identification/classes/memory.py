@@ -51,9 +51,6 @@ MOST_RATIO_WAVELETS = 4
 GRID_PER_DECADE = 3
 """Number of time constants, or of yield stretches, in a decade that are tried for a new branch."""
 
-LARGEST_YIELD = 0.5
-"""Largest yield stretch [travel]: a branch with a larger one is a spring over a whole stroke."""
-
 RESOLVED_RATIO = 1.5
 """Least ratio of the largest time constant to the smallest one that the recordings resolve, and of the
 duration to the smallest time constant [-]. Faster branches cannot be distinguished from damping, slower ones
@@ -213,10 +210,8 @@ class Recorded:
     def ranges(self) -> Ranges:
         """Time constants and yield stretches that the recordings can resolve."""
         band = max(noise_band((part.position - self.lower) / self.travel) for part in self.recordings)
-        log_yield = float(np.log(min(band, 0.5 * LARGEST_YIELD))), float(np.log(LARGEST_YIELD))
-        return Ranges(
-            None if any(part.time is None for part in self.recordings) else self._log_tau(), log_yield
-        )
+        timed = all(part.time is not None for part in self.recordings)
+        return Ranges(self._log_tau() if timed else None, (float(np.log(min(band, 0.5))), 0.0))
 
     def _log_tau(self) -> tuple[float, float]:
         """Returns logarithms of the smallest and the largest time constant that the recordings can resolve
