@@ -220,7 +220,7 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
 def of_lag(model: Model, rows: Rows, truth: Truth, error: float) -> dict[str, Any]:
     """Returns the lag that the findings propose, divided by the true one, and whether its correction raises
     the error."""
-    advice = PROPOSED_LAG.search(f"{model.notes['identification']} {model.verdict}")
+    advice = PROPOSED_LAG.search(f"{model.notes.get('identification', '')} {model.verdict}")
     if advice is None:
         return {"lag_ratio": None, "lag_raises": None}
     lag_s = float(advice[1])
