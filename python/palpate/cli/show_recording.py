@@ -107,7 +107,7 @@ def _summary(recording: Recording, strokes: dict[str, int] | None, roles: dict[s
         if len(cycles := cycles_of(recording)) > 1:
             first, last = (f"(rows {each.start} to {each.stop - 1})" for each in (cycles[0], cycles[-1]))
             stroke_text += f"; --part 'cycle N' reads one: cycle 1 {first} to cycle {len(cycles)} {last}"
-    missing = ["no time, so no velocity, damping, or memory"] if recording.time is None else []
+    missing = ["no time, so no velocity, damping or memory"] if recording.time is None else []
     missing += ["no direction, so no hysteresis"] if strokes is None else []
     return {
         "rows": f"{len(recording)} of {file_rows} in the file: {counts_text(roles)}",

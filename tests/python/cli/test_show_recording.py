@@ -60,7 +60,7 @@ def test_a_recording_without_time_prints_strokes_in_the_units_of_the_file(
     assert main(["show", str(strokes)]) == 0
     shown = printed(capsys)
     assert shown["ranges"] == "position 0 to 4 mm, force 0 to 200 gf"
-    assert shown["missing"] == "no time, so no velocity, damping, memory or lag"
+    assert shown["missing"] == "no time, so no velocity, damping or memory"
     assert shown["strokes"] == (
         "2 press, 1 release, from the order of the rows; --part 'cycle N' reads one: cycle 1 (rows 0 to 119) "
         "to cycle 2 (rows 120 to 169)"

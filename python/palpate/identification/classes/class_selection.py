@@ -96,9 +96,9 @@ class ClassSelection:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
 
-    def repeated(self, data: Rows, *, cells: int | None = None) -> ClassSelection:
+    def repeated(self, data: Rows) -> ClassSelection:
         """Repeats this model selection on changed rows."""
-        return ClassSelection(data, self.options, self.classes, cells or self.cells)
+        return ClassSelection(data, self.options, self.classes, self.cells)
 
     @cached_property
     def rows(self) -> Compressed:

@@ -211,12 +211,6 @@ class Dynamics:
             return ""
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
 
-    def values(self, basis: Basis, strokes: HysteresisInput | None, names: Sequence[str]) -> dict[str, float]:
-        """Returns the fitted mass or damping for given wavelets of the force; empty if the motion is too
-        short."""
-        regression = self._regression(basis, strokes)
-        return {} if regression is None else regression.solved(strokes is not None, names)
-
     def moving(self, values: dict[str, float]) -> Moving:
         """Returns given mass m and damping B with their force m L a + B L v at every row, with acceleration
         a, velocity v and low-pass filter L."""
