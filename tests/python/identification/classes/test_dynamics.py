@@ -256,12 +256,6 @@ def test_a_damping_that_the_last_fit_makes_negative_is_refused(monkeypatch: pyte
     assert (model.fit.model_class, model.damping) == ("position", None)
 
 
-def test_values_of_the_first_round_stay_if_the_second_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Dynamics, "values", lambda *_: {})
-    model = identify(moved(1, damping=0.03))
-    assert (model.fit.model_class, model.damping) == ("velocity", pytest.approx(0.03, rel=0.1))
-
-
 @pytest.mark.full
 def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
     whole = moved(3, seconds=6.0 * SECONDS, mass=2e-3, damping=0.06)
