@@ -286,12 +286,10 @@ def drive_display(**changes: Any) -> DeviceProfile:
 
 
 def drive_run(plan: Plan, tmp_path: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    plan.stored().save(tmp_path / "spring.json")
-    command = [control_program.PROGRAM, tmp_path / "spring.json", "--uncertified", "--wait-ms", "2000"]
-    command += ["--lowest-rate-share", "0", "--device", f"mit:{tmp_path / 'bus'}:1:damiao-4310", *words]
-    return subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, check=False, timeout=300
-    )
+    """Renders a plan on an emulated drive in virtual time, so that a busy machine has no effect."""
+    planned = plan.stored().save(tmp_path / "spring.json")
+    device = f"mit:{tmp_path / 'bus'}:1:damiao-4310"
+    return control_program.control(planned, "--uncertified", "--wait-ms", 0.5, "--device", device, *words)
 
 
 @control_program.needs_program
@@ -300,7 +298,7 @@ def test_a_drive_in_position_mode_renders_the_object_against_its_hand(tmp_path: 
     plan = palpate.plan(model, drive_display())
     assert plan.certificate is not None
     assert plan.certificate.certified, plan.verdict
-    with emulated(tmp_path / "bus", Drive()) as drive:
+    with emulated(tmp_path / "bus", Drive(counts_commands=True)) as drive:
         done = drive_run(plan, tmp_path, "--duration-s", "3", "--record", tmp_path / "record.csv")
         assert done.returncode == 0, done.stderr + done.stdout
         # The drive was commanded a position with stiffness and damping, and is disabled at the end
@@ -328,7 +326,7 @@ def test_a_drive_in_position_mode_renders_the_object_against_its_hand(tmp_path: 
 )
 def test_a_drive_refuses_a_display_that_it_is_not(changes: Any, words: str, tmp_path: Path) -> None:
     plan = palpate.plan(model_by_hand(alpha=[[5.0]], weight=[0.02], linear=[2.0]), drive_display(**changes))
-    with emulated(tmp_path / "bus", Drive()):
+    with emulated(tmp_path / "bus", Drive(counts_commands=True)):
         refused = drive_run(plan, tmp_path)
     assert refused.returncode == 2
     assert words in refused.stderr
