@@ -270,6 +270,9 @@ RULES = (
     *map(without_check, checks.CHECKS),
     Rule("shift of the strokes", f"{CLASSES}.findings", "shift_of", _nothing),
     Rule("steps of the search for a shift", f"{CLASSES}.shift", "REFINEMENTS", 1),
+    Rule(
+        "LONGEST_LAG_S 0.1, not 0.005", f"{CLASSES}.shift", "LAGS_S", 0.005 * 2.0 ** np.arange(-7.0, 0.5, 0.5)
+    ),
     Rule("velocity is compared with a shift", f"{CLASSES}.model_selection", "shift_of", _nothing),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
     Rule("check of drift", f"{CLASSES}.findings", "drift_findings", _no_findings),
