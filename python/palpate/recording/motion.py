@@ -472,19 +472,8 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
-LEAST_SPEED_SPREAD = 0.19
-"""Least spread of speeds at which slow and fast strokes are compared [-]: that of speeds spread evenly from 1
-to 2. With a smaller spread damping cannot be distinguished from friction."""
-
 LONGEST_LAG_S = 0.1
 """Longest lag of a force that is searched, and advised to be corrected [s]"""
-
-
-def spread_of_speeds(velocity: Float1D) -> float:
-    """Returns the standard deviation of the speed divided by its mean, both averaged over the distance moved,
-    so that pauses and turns have little weight; 0 without a motion."""
-    first, second, third = (float(np.sum(np.abs(velocity) ** power)) for power in (1, 2, 3))
-    return math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0
 
 
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:

@@ -8,6 +8,7 @@ constants of L are left out at both ends of a piece. Filtered samples are not in
 independent samples is computed from their autocorrelation.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import combinations
 
@@ -17,13 +18,11 @@ from numpy.typing import NDArray
 from ..._typing import Float1D, Float2D
 from ...recording.motion import (
     FORCE_RESOLUTION,
-    LEAST_SPEED_SPREAD,
     LowPass,
     Piece,
     at_rows,
     long_enough,
     quiet_low_pass,
-    spread_of_speeds,
 )
 from ..data.limits import evenly_spread
 from ..data.rows import Rows, modulo
@@ -126,6 +125,17 @@ LEAST_SHARE = 1e-9
 
 SMOOTHING_SPEED_SHARE = 0.1
 """Speed v0 of the smoothed sign tanh(v/v0) of a velocity v [share of the RMS speed]."""
+
+LEAST_SPEED_SPREAD = 0.19
+"""Least spread of speeds at which slow and fast strokes are compared [-]: that of speeds spread evenly from 1
+to 2. With a smaller spread damping cannot be distinguished from friction."""
+
+
+def spread_of_speeds(velocity: Float1D) -> float:
+    """Returns the standard deviation of the speed divided by its mean, both averaged over the distance moved,
+    so that pauses and turns have little weight; 0 without a motion."""
+    first, second, third = (float(np.sum(np.abs(velocity) ** power)) for power in (1, 2, 3))
+    return math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0
 
 
 class Dynamics:
