@@ -197,8 +197,12 @@ lint-python: setup
 lint-cpp: setup control
 	tools/cpp_lint.sh
 
-lint-stubs: setup
+# The stubs are compared with the compiled module again after one of both, or the tool, has changed.
+lint-stubs: setup $(stamps)/stubs
+
+$(stamps)/stubs: $(stamps)/core $(stamps)/lint $(wildcard tools/stub*) $(shell find python/palpate -name '*.pyi' -o -name '*.schema.json')
 	$(python) tools/stubs.py --check
+	touch $@
 
 lint-language: setup
 	$(python) tools/plain_english.py

@@ -66,7 +66,9 @@ def main() -> int:
     # The generated stubs use the type stubs of NumPy, which are complete from Python 3.11 on.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOW_LIST)]
-        return subprocess.run(command, check=False).returncode
+        # In another folder, because its options invalidate the cache of mypy.
+        with tempfile.TemporaryDirectory() as folder:
+            return subprocess.run(command, cwd=folder, check=False).returncode
     return 0
 
 
