@@ -301,7 +301,7 @@ def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] |
     nearby = np.maximum(np.nan_to_num(nearby, nan=1.0), np.finfo(float).tiny)
     speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(ticks) - 1)]
     # Speed is taken back to the last row that is far enough, at least to the row before.
-    first = np.searchsorted(tick, tick - np.ceil(2.0 * band / speed), side="right") - 1
+    first = np.searchsorted(tick, tick - 2.0 * band / speed, side="right") - 1
     first = np.maximum(np.minimum(first, np.arange(len(x)) - 1), 0)
     slow = travelled - travelled[first] < SLOW_RATIO * speed * (tick - tick[first])
     slow[0] = slow[1]

@@ -178,6 +178,15 @@ def test_a_wait_of_a_noisy_position_is_found(deviation: float) -> None:
     assert np.count_nonzero(found[330:-330]) == 0
 
 
+def test_a_settling_position_waits_if_the_hold_is_sampled_at_a_lower_rate() -> None:
+    settling = 1.0 + 0.002 * (1.0 - np.exp(-np.arange(50) / 10.0))
+    position = np.concatenate([np.linspace(0.0, 1.0, 200), settling, np.full(400, settling[-1])])
+    time = np.concatenate([0.01 * np.arange(250), 2.5 + np.arange(400.0)])
+    found = waits(position, time)
+    assert not found[:199].any()
+    assert found[205:].all()
+
+
 def test_a_slow_stroke_before_a_fast_one_does_not_wait() -> None:
     slow, fast = np.linspace(0.0, 1.0, 6000), np.linspace(1.0, 0.0, 200)
     assert rests(np.concatenate([slow, fast])) == []
