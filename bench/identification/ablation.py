@@ -56,7 +56,7 @@ FILES = 4
 LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
-SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441)
+SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 11611)
 """Draws that show a rule which other draws seldom show"""
 
 CHANGED_RATIO = 1.02
@@ -335,19 +335,48 @@ def six_bits(draw: int) -> Recording:
     return Recording.from_arrays(x, step * np.round(force / step))
 
 
+def not_zeroed(draw: int) -> Recording:
+    """Returns a press through air on a spring with a wall, with a sensor that was not set to zero."""
+    x, force = _wall(draw)
+    order, air = np.argsort(x), np.linspace(-0.2, 0.0, 400, endpoint=False)
+    noise = np.random.default_rng([41, draw]).normal(0.0, 0.002, len(air))
+    return Recording.from_arrays(np.append(air, x[order]), np.append(noise, force[order]) + 0.5)
+
+
+def without_read_time(draw: int) -> Recording:
+    """Returns a spring with a wall from a file whose time has no known unit."""
+    return replace(Recording.from_arrays(*_wall(draw)), unread_time="column t has no known unit")
+
+
+def in_millimetres(draw: int) -> Recording:
+    """Returns a spring with a wall whose positions in mm are stored in a column of metres."""
+    return Recording.from_arrays(*_wall(draw), units={"position": "m", "force": "N"})
+
+
 def _wall(draw: int) -> tuple[Array, Array]:
     x = problem("P1", draw).X[:2000, 0]
     return x, spring_wall(x) + np.random.default_rng([39, draw]).normal(0.0, 0.002, len(x))
 
 
+STORED = (joined_to_itself, six_bits, not_zeroed, without_read_time, in_millimetres)
+"""Recordings of a spring with a wall, stored in ways that look like structure or have a defect"""
+
+
 def of_stored(stored: Callable[[int], Recording], draw: int) -> Fit:
-    """Returns a spring with a wall, stored in a way that looks like structure."""
+    """Returns a spring with a wall, stored in one of the ways `STORED`."""
     recording = stored(draw)
     x = np.linspace(recording.position.min(), recording.position.max(), 1000)
-    truth = spring_wall(x)
+    truth = np.where(x > 0.0, spring_wall(x), 0.0)
     return Fit(
         [recording], lambda model: float(normalised(root_mean_square(model.force(x) - truth), truth)), {}
     )
+
+
+def of_kinks(draw: int) -> Fit:
+    """Returns a function with kinks and without noise (P4)."""
+    given = problem("P4", draw)
+    recording = Recording.from_arrays(given.X[:, 0], given.y)
+    return Fit([recording], lambda model: given.nrmse(model.force(given.X_test[:, 0])), {})
 
 
 def of_slots(draw: int) -> Fit:
@@ -438,10 +467,9 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
     found += [(f"draw {draw}", of_draw, draw) for draw in SHOWN[:draws]]
     found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
     for draw in range(files):
-        found += [
-            (f"{form.__name__}, draw {draw}", of_stored, form, draw) for form in (joined_to_itself, six_bits)
-        ]
+        found += [(f"{form.__name__}, draw {draw}", of_stored, form, draw) for form in STORED]
         found.append((f"poles and slots, draw {draw}", of_slots, draw))
+        found.append((f"kinks without noise, draw {draw}", of_kinks, draw))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found
