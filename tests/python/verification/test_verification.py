@@ -413,6 +413,18 @@ def test_rows_that_wait_are_not_compared(rows: int) -> None:
     assert found.compared.position.tolist() == with_waits(rows).position[found.rows].tolist()
 
 
+def test_rows_that_are_stored_when_the_position_changes_have_no_gap() -> None:
+    """Near a turn the time between two rows is long, but the tool does not move far."""
+    phase = np.linspace(0.0, 4.0 * np.pi, 40_000)
+    step = np.round(200.0 * (1.0 - np.cos(phase)))
+    stored = np.insert(np.diff(step) != 0.0, 0, True)
+    x, y = step[stored] / 400.0, np.sign(np.sin(phase[stored]))
+    f = 2.0 * x + 1.0 + 0.25 * y + np.random.default_rng(2).normal(0.0, NOISE, len(x))
+    recording = Recording.from_arrays(x, f, phase[stored], units=RAD)
+    # The play operator needs the first 0.2 rad to know the side of a row.
+    assert verify(identify(recording), recording, play_radius=0.1).n > len(x) - 90
+
+
 def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
     recording = with_waits(300)
     hold = np.zeros(len(recording))
