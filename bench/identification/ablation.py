@@ -232,6 +232,7 @@ RULES = (
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
     Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
+    Rule("period is fitted", f"{DATA}.period", "_fitted", lambda x, f, way, period: period),
     Rule("closed revolution is a period", "identification.identify", "revolution_of", _nothing),
     Rule("harmonics", f"{SEARCH}.growth", "select_orders", _no_orders),
     Rule("usual gap bounds the orders", f"{DATA}.rows", "Rows._usual_gap", _zero),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Period of a force that repeats over position, as of a knob with detents, from its autocorrelation; or one
-revolution."""
+"""Period of a force that repeats over position, as of a knob with detents, from its autocorrelation and a fit
+of harmonics; or one revolution."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.motion import directions_of
+from ..network.separable import TINY
 
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
@@ -25,20 +26,31 @@ SAME_PEAK = 0.95
 """Share of the largest correlation from which the correlation at a shorter distance is that of the period
 [-]: the force repeats after two periods as well."""
 
+HARMONICS = 6
+"""Number of harmonics of the fit that refines a period; with 4 or 12 the period has the same error."""
+
+FIT_STEPS = 8
+"""Number of steps of the fit that refines a period: enough from an error of a tenth of a period."""
+
+BIWEIGHT = 4.685
+"""Residual without weight [standard deviations]: 95 % efficiency for normal noise (Holland & Welsch 1977)."""
+
 
 def period_of(recordings: Sequence[Recording]) -> float | None:
     """Returns the distance after which the force repeats [position]; None without at least two repeats.
 
     The strokes of one direction are compared, because hysteresis has the same sign in them.
     """
-    position, force = _press(recordings)
-    if not len(position):
+    position, force, way = _strokes(recordings)
+    press = way > 0.0
+    if not press.any():
         return None
-    travel, cells = float(np.ptp(position)), len(force) // 2
+    least, travel, cells = position[press].min(), float(np.ptp(position[press])), int(press.sum()) // 2
     if not travel > 0.0:
         return None
-    peak = _first_peak(_autocorrelation(_curve((position - position.min()) / travel, force, cells)))
-    return None if peak is None else peak * travel / cells
+    curve = _curve((position[press] - least) / travel, force[press], cells)
+    peak = _first_peak(_autocorrelation(curve))
+    return None if peak is None else _fitted(position, force, way, peak * travel / cells)
 
 
 def revolution_of(recordings: Sequence[Recording]) -> float | None:
@@ -47,7 +59,8 @@ def revolution_of(recordings: Sequence[Recording]) -> float | None:
     Then neither the gap between two angles nor the step of the force is larger where the revolution closes
     than somewhere along the strokes. The force of a torsion spring jumps there.
     """
-    position, force = _press(recordings)
+    position, force, way = _strokes(recordings)
+    position, force = position[way > 0.0], force[way > 0.0]
     if not len(position) or any(each.units["position"] != "rad" for each in recordings):
         return None
 
@@ -62,15 +75,45 @@ def revolution_of(recordings: Sequence[Recording]) -> float | None:
     return REVOLUTION if closed else None
 
 
-def _press(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D]:
-    """Returns positions and forces of the press strokes of recordings; empty if the direction is not known or
-    the force has further inputs."""
+def _strokes(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D, Float1D]:
+    """Returns positions, forces and directions of the rows of recordings in which the tool moves; empty if
+    the direction is not known or the force has further inputs."""
     ways = [directions_of(each) for each in recordings]
     if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
-        return np.zeros(0), np.zeros(0)
-    press = np.concatenate([way > 0 for way in ways if way is not None])
-    position = np.concatenate([each.position for each in recordings])[press]
-    return position, np.concatenate([each.force for each in recordings])[press]
+        return np.zeros(0), np.zeros(0), np.zeros(0)
+    way = np.concatenate([way for way in ways if way is not None])
+    position, force = (
+        np.concatenate([getattr(each, name) for each in recordings])[way != 0.0]
+        for name in ("position", "force")
+    )
+    return position, force, way[way != 0.0]
+
+
+def _fitted(position: Float1D, force: Float1D, way: Float1D, period: float) -> float:
+    """Returns the period [position] with which harmonics fit the force best, a sum for each direction.
+
+    Gauss-Newton steps of the period, with the amplitudes eliminated (Golub & Pereyra 1973, in Kaufman's
+    form). Tukey's biweight leaves out the rows behind turns, in which friction reverses, and wrong readings.
+    """
+    position, travel = position - position.mean(), float(np.ptp(position))
+    order, weight = np.arange(1, HARMONICS + 1), np.ones(len(force))
+    residual, slope = np.zeros(len(force)), np.zeros(len(force))
+    for _ in range(FIT_STEPS):
+        waves = np.exp(2j * np.pi * position / period)[:, None] ** order
+        for stroke in (way > 0.0, way < 0.0):
+            cosine, sine, w = waves[stroke].real, waves[stroke].imag, weight[stroke, None]
+            columns = np.column_stack([np.ones(len(cosine)), cosine, sine])
+            found = np.linalg.lstsq(w * columns, weight[stroke] * force[stroke], rcond=None)[0]
+            of_cosine, of_sine = order * found[1:].reshape(2, -1)
+            turned = 2.0 * np.pi * position[stroke] / period**2 * (sine @ of_cosine - cosine @ of_sine)
+            explained = columns @ np.linalg.lstsq(w * columns, weight[stroke] * turned, rcond=None)[0]
+            residual[stroke], slope[stroke] = force[stroke] - columns @ found, turned - explained
+        step = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), TINY)
+        # A tenth of a period over the travel, so that the fit stays at its minimum.
+        period += float(np.clip(step, -0.1 * period**2 / travel, 0.1 * period**2 / travel))
+        scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), TINY)
+        weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
+    return period
 
 
 def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:

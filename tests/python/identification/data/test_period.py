@@ -49,6 +49,16 @@ def test_rows_that_are_held_out_do_not_change_the_period() -> None:
     assert period_of([train]) == pytest.approx(15.0, rel=3e-5)
 
 
+@pytest.mark.parametrize("wrong", [0, 12])
+@pytest.mark.parametrize("travel", [35.0, 55.0])
+def test_friction_that_reverses_and_wrong_readings_do_not_shift_the_period(travel: float, wrong: int) -> None:
+    angle, random = press_and_release(400, travel), np.random.default_rng(2)
+    side = np.concatenate([np.minimum(angle[:400] - 1.0, 1.0), np.maximum(angle[400:] - travel + 1.0, -1.0)])
+    torque = knob(angle) + 2.5 * side + random.normal(0.0, 0.02, 800)
+    torque[random.choice(800, wrong, replace=False)] += 40.0
+    assert period_of([Recording.from_arrays(angle, torque)]) == pytest.approx(15.0, rel=3e-5)
+
+
 def spring(x: Array) -> Array:
     return 2.0 * x
 
