@@ -156,9 +156,5 @@ def _first_peak(correlation: Float1D) -> float | None:
         around = around[(around > 0) & (around < len(correlation) - 1)]
         if not len(around):
             break
-        top = int(around[np.argmax(correlation[around])])
-        left, middle, right = correlation[top - 1 : top + 2]
-        bend = left - 2.0 * middle + right
-        shift = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
-        first = (top + float(np.clip(shift, -0.5, 0.5))) / repeat
+        first = int(around[np.argmax(correlation[around])]) / repeat
     return first
