@@ -48,9 +48,9 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
     least, travel, cells = position[press].min(), float(np.ptp(position[press])), int(press.sum()) // 2
     if not travel > 0.0:
         return None
-    curve = _curve((position[press] - least) / travel, force[press], cells)
-    peak = _first_peak(_autocorrelation(curve))
-    return None if peak is None else _fitted(position, force, way, peak * travel / cells)
+    box, share = (position - least) / travel, force / (float(np.abs(force).max()) or 1.0)
+    peak = _first_peak(_autocorrelation(_curve(box[press], share[press], cells)))
+    return None if peak is None else travel * _fitted(box, share, way, peak / cells)
 
 
 def revolution_of(recordings: Sequence[Recording]) -> float | None:
@@ -89,28 +89,28 @@ def _strokes(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D, Float1D
     return position, force, way[way != 0.0]
 
 
-def _fitted(position: Float1D, force: Float1D, way: Float1D, period: float) -> float:
-    """Returns the period [position] with which harmonics fit the force best, a sum for each direction.
+def _fitted(box: Float1D, force: Float1D, way: Float1D, period: float) -> float:
+    """Returns the period [travel] with which harmonics fit the force best, a sum for each direction.
 
     Gauss-Newton steps of the period, with the amplitudes eliminated (Golub & Pereyra 1973, in Kaufman's
     form). Tukey's biweight leaves out the rows behind turns, in which friction reverses, and wrong readings.
     """
-    position, travel = position - position.mean(), float(np.ptp(position))
+    box = box - box.mean()
     order, weight = np.arange(1, HARMONICS + 1), np.ones(len(force))
     residual, slope = np.zeros(len(force)), np.zeros(len(force))
     for _ in range(FIT_STEPS):
-        waves = np.exp(2j * np.pi * position / period)[:, None] ** order
+        waves = np.exp(2j * np.pi * box / period)[:, None] ** order
         for stroke in (way > 0.0, way < 0.0):
             cosine, sine, w = waves[stroke].real, waves[stroke].imag, weight[stroke, None]
             columns = np.column_stack([np.ones(len(cosine)), cosine, sine])
             found = np.linalg.lstsq(w * columns, weight[stroke] * force[stroke], rcond=None)[0]
             of_cosine, of_sine = order * found[1:].reshape(2, -1)
-            turned = 2.0 * np.pi * position[stroke] / period**2 * (sine @ of_cosine - cosine @ of_sine)
+            turned = 2.0 * np.pi * box[stroke] / period**2 * (sine @ of_cosine - cosine @ of_sine)
             explained = columns @ np.linalg.lstsq(w * columns, weight[stroke] * turned, rcond=None)[0]
             residual[stroke], slope[stroke] = force[stroke] - columns @ found, turned - explained
         step = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), TINY)
         # A tenth of a period over the travel, so that the fit stays at its minimum.
-        period += float(np.clip(step, -0.1 * period**2 / travel, 0.1 * period**2 / travel))
+        period += float(np.clip(step, -0.1 * period**2, 0.1 * period**2))
         scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), TINY)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
     return period
@@ -133,7 +133,6 @@ def _autocorrelation(curve: Float1D) -> Float1D:
     that both have."""
     n = len(curve)
     centred = curve - curve.mean()
-    centred = centred / (float(np.abs(centred).max()) or 1.0)  # no overflow of a large force
     spectrum = np.fft.rfft(centred, 2 * n)
     products = np.fft.irfft(spectrum * spectrum.conj())[: n // 2]
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])

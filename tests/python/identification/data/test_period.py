@@ -16,10 +16,10 @@ TURNS = press_and_release(3600, 1080.0)
 
 
 def turned(angle: Array, torque: Array, unit: float = 1.0) -> Recording:
-    """Returns a recording of a knob with friction; `unit` is the unit of the angle."""
+    """Returns a recording of a knob with friction; `unit` is the unit of the angle, and torque is in 1/unit."""
     way = np.sign(np.gradient(angle))
     torque = torque + 2.5 * way + np.random.default_rng(1).normal(0.0, 0.25, len(angle))
-    return Recording.from_arrays(unit * angle, torque)
+    return Recording.from_arrays(unit * angle, torque / unit)
 
 
 def test_the_period_of_a_knob_is_found_over_three_turns() -> None:
