@@ -16,7 +16,7 @@ TURNS = press_and_release(3600, 1080.0)
 
 
 def turned(angle: Array, torque: Array, unit: float = 1.0) -> Recording:
-    """Returns a recording of a knob with friction; `unit` is the unit of the angle, and torque is in 1/unit."""
+    """Returns a recording of a knob with friction; angles are in `unit`, torques in 1/`unit`."""
     way = np.sign(np.gradient(angle))
     torque = torque + 2.5 * way + np.random.default_rng(1).normal(0.0, 0.25, len(angle))
     return Recording.from_arrays(unit * angle, torque / unit)
