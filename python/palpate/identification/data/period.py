@@ -11,7 +11,6 @@ import numpy as np
 from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.motion import directions_of
-from ..network.separable import TINY
 
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
@@ -95,7 +94,7 @@ def _fitted(box: Float1D, force: Float1D, way: Float1D, period: float) -> float:
     Gauss-Newton steps of the period, with the amplitudes eliminated (Golub & Pereyra 1973, in Kaufman's
     form). Tukey's biweight leaves out the rows behind turns, in which friction reverses, and wrong readings.
     """
-    box = box - box.mean()
+    box, tiny = box - box.mean(), float(np.finfo(float).tiny)
     order, weight = np.arange(1, HARMONICS + 1), np.ones(len(force))
     residual, slope = np.zeros(len(force)), np.zeros(len(force))
     for _ in range(FIT_STEPS):
@@ -108,10 +107,10 @@ def _fitted(box: Float1D, force: Float1D, way: Float1D, period: float) -> float:
             turned = 2.0 * np.pi * box[stroke] / period**2 * (sine @ of_cosine - cosine @ of_sine)
             explained = columns @ np.linalg.lstsq(w * columns, weight[stroke] * turned, rcond=None)[0]
             residual[stroke], slope[stroke] = force[stroke] - columns @ found, turned - explained
-        step = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), TINY)
+        step = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), tiny)
         # A tenth of a period over the travel, so that the fit stays at its minimum.
         period += float(np.clip(step, -0.1 * period**2, 0.1 * period**2))
-        scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), TINY)
+        scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), tiny)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
     return period
 
