@@ -146,6 +146,13 @@ def test_rows_that_repeat_a_slower_sensor_are_neither_fitted_nor_compared(slower
     assert check.nrmse == pytest.approx(model.fit.nrmse, rel=0.1)
 
 
+def test_an_input_that_is_constant_in_each_press_is_not_a_slower_sensor() -> None:
+    random = np.random.default_rng(1)
+    depth, place = np.tile(np.linspace(0.0, 1e-3, 8), 60), np.repeat(random.uniform(0.0, 0.06, 60), 8)
+    force = 500.0 * depth * (1.0 + place) + random.normal(0.0, 1e-3, len(depth))
+    assert not repeated_rows(palpate.Recording.from_arrays(depth, force, inputs={"place": place})).any()
+
+
 @pytest.mark.parametrize("noise_steps", [0.0, 0.2, 1.0])
 def test_a_coarse_sensor_is_not_a_slower_one(noise_steps: float) -> None:
     random, step = np.random.default_rng(1), 0.2

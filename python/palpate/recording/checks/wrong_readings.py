@@ -49,7 +49,8 @@ def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
     again = np.zeros(len(recording), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
     again &= again.mean() > REPEATED_ROWS_SHARE
-    held, slowest = max(((_rows_held(each), each) for each in measured), key=lambda each: each[0])
+    # A further input, such as the place of a press, may keep its value while the tool moves.
+    held, slowest = max(((_rows_held(each), each) for each in measured[:2]), key=lambda each: each[0])
     index = np.arange(len(again))
     begins = np.maximum.accumulate(np.where(np.diff(slowest, prepend=np.nan) != 0.0, index, 0))
     return np.asarray(again | ((index - begins) % held > 0))
