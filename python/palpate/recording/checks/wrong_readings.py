@@ -44,13 +44,14 @@ more single rows."""
 def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
     """Returns True (n,) for rows that repeat the reading of a sensor that is slower than the recorder: only
     the first row with a reading was measured, and the others are late."""
-    measured = [recording.position, recording.force, *recording.inputs.T]
-    columns = measured if recording.direction is None else [*measured, recording.direction]
+    columns = [recording.position, recording.force, *recording.inputs.T]
+    columns += [] if recording.direction is None else [recording.direction]
     again = np.zeros(len(recording), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
     again &= again.mean() > REPEATED_ROWS_SHARE
     # A further input, such as the place of a press, may keep its value while the tool moves.
-    held, slowest = max(((_rows_held(each), each) for each in measured[:2]), key=lambda each: each[0])
+    sensors = recording.position, recording.force
+    held, slowest = max(((_rows_held(each), each) for each in sensors), key=lambda each: each[0])
     index = np.arange(len(again))
     begins = np.maximum.accumulate(np.where(np.diff(slowest, prepend=np.nan) != 0.0, index, 0))
     return np.asarray(again | ((index - begins) % held > 0))
