@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -178,6 +179,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status.report(as_json="--json" in given)
         code = status.code
     drop_what_cannot_be_written()
-    if code == INTERRUPTED and arguments is None:
-        os._exit(code)  # a normal exit would unload the libraries, which takes long
+    if arguments is None:
+        gc.freeze()  # else Python searches all objects of the libraries for garbage before it ends
+        if code == INTERRUPTED:
+            os._exit(code)  # a normal exit would unload the libraries, which takes long
     return code

@@ -10,8 +10,12 @@ from threadpoolctl import ThreadpoolController
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """Returns the BLAS libraries of NumPy and SciPy; the search takes some milliseconds."""
-    import_module("scipy.linalg")  # SciPy has its own library, and only a loaded library is found
+    """Returns the BLAS libraries of NumPy and SciPy; the search takes some milliseconds.
+
+    Only a loaded library is found, and scipy.linalg has its own one. scipy.optimize imports it; imported here,
+    because Python 3.11 imports up to ten times slower from deep within the search of a model.
+    """
+    import_module("scipy.optimize")
     return ThreadpoolController()
 
 
