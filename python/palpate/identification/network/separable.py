@@ -14,8 +14,7 @@ Refinement moves all dilations and translations at once, by bounded variable pro
 biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps are taken on
 log(alpha) and beta. Without bounds, a dilation can grow without limit on measured switch curves, and the
 least squares becomes singular. So dilations stay within the resolution of the positions around the wavelet,
-and translations near the data. A step is kept only if it lowers the squared error, so that the result is
-never worse than the start.
+and translations near the data, from the start on. A step is kept only if it lowers the squared error.
 """
 
 from __future__ import annotations
@@ -445,13 +444,16 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
     """Refines the wavelets of `start` to lower the penalised squared error, by at most `steps` accepted or
     refused steps.
 
-    Refinement ends after MOST_IDLE_STEPS successive accepted steps that each lowered the deviance by less
+    Wavelets outside the bounds, as those of a frame or of other rows can be, are moved to the bounds first:
+    else every step would move them, raise the error, and be refused. Refinement ends after MOST_IDLE_STEPS successive accepted steps that each lowered the deviance by less
     than `tolerance`.
     """
-    best, linearised = start, None
     if start.basis.hats == 0:
-        return best
-    step_damping, idle, finest = 1e-2, 0, problem.finest(best.basis)
+        return start
+    basis, finest = _moved(problem, start.basis, np.zeros(2 * problem.dimension * len(start.basis)))
+    within = (basis.alpha == start.basis.alpha).all() and (basis.beta == start.basis.beta).all()
+    best, linearised = start if within else problem.solve(basis), None
+    step_damping, idle = 1e-2, 0
     for _ in range(steps):
         if linearised is not best:
             matrix, gradient = problem.normal_equations(best)

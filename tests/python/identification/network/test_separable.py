@@ -83,6 +83,16 @@ def test_refinement_finds_the_generating_wavelet() -> None:
     assert refined.basis.beta[0, 0] == pytest.approx(0.37, abs=1e-7)
 
 
+@pytest.mark.parametrize("translation", [-0.5, 1.5])
+def test_a_wavelet_outside_the_bounds_does_not_stop_the_refinement(translation: float) -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    problem = problem_from(x, 2.0 * x - 1.0 + 0.7 * hat(x, 13.0, 0.37) + 20.0 * hat(x, 1.0, translation))
+    start = Basis(np.array([[8.0], [1.0]]), np.array([[0.41], [translation]]))
+    refined = refine(problem, problem.solve(start), steps=40, tolerance=0.0)
+    assert refined.basis.alpha[0, 0] == pytest.approx(13.0, rel=0.1)
+    assert refined.basis.beta[0, 0] == pytest.approx(0.37, abs=5e-3)
+
+
 def test_dilations_stay_bounded_on_a_jump() -> None:
     """At a jump of the force dilations would grow to infinity; the resolution of the data limits them."""
     x = np.linspace(0.0, 1.0, 300)
