@@ -12,8 +12,8 @@ from threadpoolctl import ThreadpoolController
 def _libraries() -> ThreadpoolController:
     """Returns the BLAS libraries of NumPy and SciPy; the search takes some milliseconds.
 
-    Only a loaded library is found, and scipy.linalg has its own one. scipy.optimize imports it; imported here,
-    because Python 3.11 imports up to ten times slower from deep within the search of a model.
+    Only a loaded library is found, and scipy.linalg has its own one. scipy.optimize imports it. Python 3.11
+    can take ten times as long to import it from deep within the search of a model.
     """
     import_module("scipy.optimize")
     return ThreadpoolController()

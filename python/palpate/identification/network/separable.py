@@ -445,8 +445,8 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
     refused steps.
 
     Wavelets outside the bounds, as those of a frame or of other rows can be, are moved to the bounds first:
-    else every step would move them, raise the error, and be refused. Refinement ends after MOST_IDLE_STEPS successive accepted steps that each lowered the deviance by less
-    than `tolerance`.
+    else every step would move them, raise the error, and be refused. Refinement ends after MOST_IDLE_STEPS
+    successive accepted steps that each lowered the deviance by less than `tolerance`.
     """
     if start.basis.hats == 0:
         return start
