@@ -135,7 +135,7 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRule) {
     test::Random random{91};
     int three = 0;
     int tried = 0;
-    for (int k = 0; k < test::cases(8); ++k) {
+    for (int k = 0; k < test::cases(12); ++k) {
         const double fall_by_slope = k % 2 == 0 ? 1.5 : 0.9;
         const WaveletNetwork object{test::random_network(random, static_cast<std::size_t>(1 + k % 6)),
                                     test::unit_domain()};
@@ -171,7 +171,7 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRule) {
             ASSERT_TRUE(fall_by_slope > 1.0 || roots == 1) << k << " " << j;
         }
     }
-    EXPECT_GT(tried, test::cases(8) * 20);
+    EXPECT_GT(tried, test::cases(12) * 20);
     EXPECT_GT(three, tried / 600) << "the case is about steps with several roots";
 }
 

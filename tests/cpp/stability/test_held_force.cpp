@@ -798,9 +798,9 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfADelayedForce) {
         timing.delay = k % 3 + tau;
         return delayed_need(k % 3, tau, slopes);
     };
-    EXPECT_EQ(violated(1.0, test::cases(20), need), 0);
+    EXPECT_EQ(violated(1.0, 40, need), 0);
     // With 0.6 times the required damping the search finds motions that take energy out.
-    EXPECT_GE(violated(0.6, 20, need), 5);
+    EXPECT_GE(violated(0.6, 40, need), 10);
 }
 
 TEST(HeldForce, NoMotionTakesEnergyOutWithJitter) {
@@ -810,8 +810,8 @@ TEST(HeldForce, NoMotionTakesEnergyOutWithJitter) {
         timing.jitter = std::array{0.03, 0.1, 0.3, 0.6}[static_cast<std::size_t>(k % 4)];
         return (1.0 + timing.jitter) * detail::jittered_need(timing.delay, 1.0, timing.jitter, slopes);
     };
-    EXPECT_EQ(violated(1.0, test::cases(20), need), 0);
-    EXPECT_GE(violated(0.4, 20, need), 3);
+    EXPECT_EQ(violated(1.0, 40, need), 0);
+    EXPECT_GE(violated(0.4, 40, need), 8);
 }
 
 TEST(HeldForce, NoMotionTakesEnergyOutOfAPredictedForce) {
@@ -825,8 +825,8 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfAPredictedForce) {
         taps.insert(taps.end(), timing.taps.begin(), timing.taps.end());
         return filtered_need(taps, tau, slopes, 1.0 - tau);
     };
-    EXPECT_EQ(violated(1.0, test::cases(20), need), 0);
-    EXPECT_GE(violated(0.4, 20, need), 3);
+    EXPECT_EQ(violated(1.0, 40, need), 0);
+    EXPECT_GE(violated(0.4, 40, need), 8);
 }
 
 }  // namespace

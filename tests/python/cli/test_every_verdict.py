@@ -14,10 +14,6 @@ from palpate.verdict import LEVELS, Verdict, no, usable
 from test_cli_identify import spring
 from test_every_verb import VERBS
 
-every_quick_verb = pytest.mark.parametrize(
-    "verb", sampled(sorted(VERBS), *(verb for verb in VERBS if verb != "demo"))
-)
-
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -27,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@every_quick_verb
+@pytest.mark.parametrize("verb", sampled(sorted(VERBS), *(verb for verb in VERBS if verb != "demo")))
 def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
     verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

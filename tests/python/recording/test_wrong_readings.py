@@ -215,7 +215,8 @@ def wrong_rows(x: Array, y: Array) -> list[int]:
         pytest.param({300: 60.0}, id="moderate", marks=pytest.mark.full),
         pytest.param({100: 500.0, 101: 500.0}, id="pair", marks=pytest.mark.full),
         pytest.param({200: 20.0, 500: -60.0, 600: 30.0}, id="several"),
-        pytest.param({0: 2000.0}, id="first", marks=pytest.mark.full),
+        pytest.param({0: 30.0}, id="first", marks=pytest.mark.full),
+        pytest.param({0: 2000.0}, id="first, beyond all others", marks=pytest.mark.full),
         pytest.param({799: -200.0}, id="last"),
     ],
 )

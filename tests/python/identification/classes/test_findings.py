@@ -206,10 +206,21 @@ def test_release_above_press_at_a_place_is_not_called_another_input() -> None:
     assert "depends on more" not in reason
 
 
-def test_few_rows_are_named_as_the_cause_when_only_rows_left_out_do_not_fit() -> None:
-    x = np.r_[np.linspace(0.0, 3.8, 20), np.linspace(3.8, 0.0, 20)]
-    side = np.repeat([1.0, -1.0], 20)
-    click = np.exp(-(((x - 1.6) / 0.15) ** 2))
+@pytest.mark.parametrize(
+    ("release_from", "rows", "release_click", "width"),
+    [
+        (3.8, 20, 1.6, 0.15),
+        pytest.param(
+            3.6, 19, 1.4, 0.1, marks=pytest.mark.xfail(reason="a shift of the strokes is named as the cause")
+        ),
+    ],
+)
+def test_few_rows_are_named_as_the_cause_when_only_rows_left_out_do_not_fit(
+    release_from: float, rows: int, release_click: float, width: float
+) -> None:
+    x = np.r_[np.linspace(0.0, 3.8, 20), np.linspace(release_from, 0.0, rows)]
+    side = np.repeat([1.0, -1.0], [20, rows])
+    click = np.exp(-(((x - np.where(side > 0.0, 1.6, release_click)) / width) ** 2))
     force = 20.0 * (1.0 - np.exp(-x / 0.1)) + 20.0 * click + 1.5 * side + 200.0 * np.maximum(x - 3.5, 0.0)
     model = palpate.identify(palpate.Recording.from_arrays(x, force, direction=side))
     (reason,) = (each for each in model.verdict.reasons if "left out" in each)
