@@ -126,8 +126,7 @@ def unchanged(*paths: Path) -> Iterator[None]:
     before = [_state_of(path) for path in paths]
     # Two changes within one tick get the same time, so the tick of the last change must be over.
     ages_s = [time.time() - 1e-9 * state[-1] for state in before if state is not None]
-    if any(abs(age) < _TICK_S for age in ages_s):
-        time.sleep(_TICK_S)
+    time.sleep(max((_TICK_S - age for age in ages_s if abs(age) < _TICK_S), default=0.0))
 
     def refuse_changed() -> None:
         for path, state in zip(paths, before, strict=True):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -155,15 +156,15 @@ def push_ticks(
     smaller_share: float = 0.6,
 ) -> dict[str, np.ndarray]:
     """Returns ticks of alternating pushes on a free handle: inertia 2e-4 kg m^2, damping 0.06 N m s/rad."""
-    sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
+    sent, position = np.zeros(2000), np.zeros(2000)
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
     sent *= np.where(np.arange(2000) // 600 % 2, smaller_share, 1.0)
-    x = 0.0
-    for k in range(1, 2000):
+    x = speed = 0.0
+    for k, force in enumerate(sent[:-1].tolist(), 1):
         for _ in range(20):
-            free = speed + 5e-5 / 2e-4 * (-motor_sign * sent[k - 1] - 0.06 * speed)
-            speed = np.copysign(max(0.0, abs(free) - 5e-5 / 2e-4 * friction), free)
+            free = speed + 5e-5 / 2e-4 * (-motor_sign * force - 0.06 * speed)
+            speed = math.copysign(max(0.0, abs(free) - 5e-5 / 2e-4 * friction), free)
             x += 5e-5 * speed
         position[k] = x
     time = 1e-3 * np.arange(2000)
