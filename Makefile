@@ -116,9 +116,9 @@ test: | setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# Files keep their order, because the longest ones contain few tests and would start last. One process more than
-# processors, because tests wait for programs that they start.
-parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
+# Each process starts with a part of the files in their order, so that the tests of a file share its fixtures. One process
+# more than processors, because tests wait for programs that they start.
+parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist worksteal
 test-python: setup control
 	$(parallel_pytest)
 
