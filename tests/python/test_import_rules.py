@@ -2,6 +2,7 @@
 """Imports of the package: only optional or slow packages inside functions, and no cycle."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,14 @@ def targets_of(path: Path, node: ast.Import | ast.ImportFrom) -> list[str]:
     return [f"{module}.{alias.name}" for alias in node.names]
 
 
+@cache
+def imports_of(path: Path) -> set[str]:
+    """Returns what all import statements of a file load."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    return {target for node in imports for target in targets_of(path, node)}
+
+
 def is_late(target: str) -> bool:
     return any(f"{target}.".startswith(f"{each}.") for each in IMPORTED_LATE)
 
@@ -68,10 +77,7 @@ def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_of_scipy_is_loaded_by_its_first_use(path: Path) -> None:
     """After `import scipy`, SciPy loads a module such as `scipy.linalg` at its first use."""
-    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
-    targets = {target for node in imports for target in targets_of(path, node)}
-    assert not [target for target in targets if target.startswith("scipy.")]
+    assert not [target for target in imports_of(path) if target.startswith("scipy.")]
 
 
 def imported_modules(path: Path, all_modules: set[str]) -> set[str]:
@@ -124,7 +130,4 @@ LISTENING = {PACKAGE / "app" / name for name in ("server.py", "live.py")}
     "path", sorted({*FILES} - LISTENING), ids=lambda path: str(path.relative_to(PACKAGE))
 )
 def test_no_module_imports_a_network_library(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    imports = [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
-    used = {target.split(".")[0] for node in imports for target in targets_of(path, node)}
-    assert not used & NETWORK
+    assert not {target.split(".")[0] for target in imports_of(path)} & NETWORK
