@@ -204,8 +204,12 @@ $(stamps)/stubs: $(stamps)/core $(stamps)/lint $(wildcard tools/stub*) $(shell f
 	$(python) tools/stubs.py --check
 	touch $@
 
-lint-language: setup
+# The texts are checked again after a file, or the list of files, has changed.
+lint-language: setup $(stamps)/language
+
+$(stamps)/language: $(stamps)/lint $(wildcard .git/index $(shell git ls-files 2>/dev/null))
 	$(python) tools/plain_english.py
+	touch $@
 
 format: setup
 	$(python) -m ruff check --fix .
