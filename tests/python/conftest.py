@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "clock"))
+sys.path[:0] = [str(ROOT / "tests" / "clock"), str(ROOT / "tests" / "usb")]
 
 # A shell that starts the tests in the background makes the tests and their child processes ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

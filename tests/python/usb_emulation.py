@@ -6,7 +6,6 @@ from __future__ import annotations
 import csv
 import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
+from run_emulated import emulator
 
 RUNNER = ROOT / "tests" / "usb" / "run_emulated.py"
 
@@ -36,7 +36,7 @@ def emulated(
 
     The clock of the command shows the time of the device, so a busy machine has no effect.
     """
-    words = [sys.executable, RUNNER, "--lock-step", *device, "--", *command]
+    words = [emulator(), "--lock-step", *device, "--", *command]
     return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
 
 
