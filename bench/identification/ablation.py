@@ -40,7 +40,6 @@ from bench.studies import count, markdown_table, measured_data, write_results
 import palpate
 from palpate import InputError, Model, Recording
 from palpate.baselines import comparable
-from palpate.identification.data.strokes import weights_behind_turns
 from palpate.recording import checks
 from palpate.recording.checks import Check
 from palpate.recording.motion import strokes_from_order, velocity, waits
@@ -168,12 +167,12 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
+def _moves(path: Any, order: Any, distance: float) -> Any:
+    return order != 0.0
+
+
 def _whole(path: Any, *_: Any) -> Any:
     return np.ones(len(path))
-
-
-def _not_near(path: Any, order: Any, residual: Any, touched: Any, least: float, *_: Any) -> Any:
-    return weights_behind_turns(path, order, residual, touched, least, 0)
 
 
 class OfForces(Informative):
@@ -256,11 +255,10 @@ RULES = (
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
+    Rule("radius of strokes without reversals", f"{CLASSES}.hysteresis", "settled_rows", _moves),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{CLASSES}.hysteresis", "weights_behind_turns", _whole),
-    Rule(
-        "rows next to turns of a tool that leaves", f"{CLASSES}.hysteresis", "weights_behind_turns", _not_near
-    ),
+    Rule("rows next to turns of a tool that leaves", f"{DATA}.strokes", "NEXT_TO_TURN", 0),
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),

@@ -62,7 +62,7 @@ class SearchOptions:
     with three or more. More positions are gathered in about this number of cells [-]"""
     play_radius: tuple[float, ...] = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.06)
     """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
-    smallest and the largest is searched [share of the travel]"""
+    smallest and the largest, of three or more, is searched [share of the travel]"""
     contact_share: float = 0.02
     """Largest |force| at the lower end of the domain, as a share of the force range, at which the tool leaves
     the object there: continuation "free" below the domain; at least the RMS error [-]"""

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
 from ..data.limits import evenly_spread
-from ..data.strokes import FAR, LEAST_KNOWN_SHARE, NEXT_TO_TURN, HysteresisInput, weights_behind_turns
+from ..data.strokes import LEAST_KNOWN_SHARE, HysteresisInput, settled_rows, weights_behind_turns
 from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
 from ..network.constraints import impose
@@ -83,9 +83,10 @@ class Hysteresis(ModelClass):
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
             # The direction can also change at once at a turn. Wavelets of strokes without their reversals
             # show the radius; those of all rows would fit the reversals.
-            order = HysteresisInput(data.order, data.order != 0.0)
-            basis = self._free(below, self._weighted(order, below.solution.basis, FAR)).solution.basis
-            best = self._free(below, order)
+            order = self._weighted(HysteresisInput(data.order, data.order != 0.0), basis)
+            best, settled = self._free(below, order), play.settled(order)
+            if settled.both_ways:
+                basis = self._free(below, settled).solution.basis
         for strokes in play.best_of_options(basis):
             found = self._free(below, strokes, play, first=basis)
             best = found if best is None or self._fits_better(found, best) else best
@@ -187,9 +188,9 @@ class Hysteresis(ModelClass):
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
         return found
 
-    def _weighted(self, strokes: HysteresisInput, basis: Basis, near: int = NEXT_TO_TURN) -> HysteresisInput:
+    def _weighted(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """Returns direction states with weights of the rows behind turns, from fits of given wavelets, each
-        with the weights before. `near` is that of :func:`weights_behind_turns`."""
+        with the weights before."""
         data, samples = self._selection.data, self._selection.samples
         reach = float(np.ptp(data.force[data.fitted]))
         if data.order is None or strokes.weight is not None or reach == 0.0:
@@ -200,7 +201,7 @@ class Hysteresis(ModelClass):
             problem = samples.problem(samples.rows(strokes), strokes)
             found = self._selection.candidate(self.name, problem, problem.solve(basis), "", strokes=strokes)
             residual, least = data.force - found.force_at(), FORCE_RESOLUTION * reach
-            weight = weights_behind_turns(data.path[:, 0], order, residual, touched, least, near)
+            weight = weights_behind_turns(data.path[:, 0], order, residual, touched, least)
             strokes = replace(strokes, weight=weight)
         return strokes
 
@@ -275,21 +276,30 @@ class PlaySearch:
         self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
+    def settled(self, order: HysteresisInput) -> HysteresisInput:
+        """Returns the directions of the rows at which every tried play has reversed."""
+        fitted = order.side * self._samples.data.fitted
+        return replace(order, known=settled_rows(self._path, fitted, 2.0 * self._radii[-1]))
+
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given
         wavelets is smaller than at its neighbours, and than that of the order of rows.
 
-        Wavelets that fit the rows after a turn can make a wrong radius the best one. Returns none if the
-        motions between gaps of time are too short for every play radius, or never reverse: with one stroke
-        only the sum g + h is determined.
+        Where the order of rows is known, the smallest and the largest of three or more radii are not
+        returned: the error can fall further beyond them. Returns none if the motions between gaps of time
+        are too short for every play radius, or never reverse: with one stroke only the sum g + h is
+        determined.
         """
         if not self._usable:
             return []
         known, order, least = self._thinned(self._usable[-1]), self._samples.data.order, math.inf
+        beyond = math.inf
         if order is not None:
             known &= order != 0.0
             least = self._residual_squares(HysteresisInput(order, known), basis, known)
-        errors = [math.inf, *(self._residual_squares(each, basis, known) for each in self._usable), math.inf]
+            beyond = 0.0 if len(self._usable) > 2 else math.inf
+        errors = [self._residual_squares(each, basis, known) for each in self._usable]
+        errors = [beyond, *errors, beyond]
         return [
             strokes
             for strokes, before, error, after in zip(

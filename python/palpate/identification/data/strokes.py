@@ -224,13 +224,25 @@ NEXT_TO_TURN = 2
 """Number of distances, from the smallest one, next to a turn."""
 
 
+def settled_rows(path: Float1D, order: Float1D, distance: float) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows of a stroke that are further behind its turn than a distance [travel].
+
+    `path` (n,) holds positions in recorded order [travel], `order` (n,) directions, 0 for rows of no stroke.
+    """
+    moving, settled = np.flatnonzero(order), np.zeros(len(path), dtype=bool)
+    x, way = path[moving], order[moving] > 0.0
+    first = np.diff(way, prepend=not way[:1]) != 0
+    turn = np.maximum(np.flatnonzero(first) - 1, 0)[np.cumsum(first) - 1]
+    settled[moving] = np.abs(x - x[turn]) > distance
+    return settled
+
+
 def weights_behind_turns(
     path: Float1D,
     order: Float1D,
     residual: Float1D,
     touched: NDArray[np.bool_],
     least: float,
-    near: int = NEXT_TO_TURN,
 ) -> Float1D:
     """Returns the weight (n,) of each row in a fit, from 0 to 1.
 
@@ -253,8 +265,6 @@ def weights_behind_turns(
         True for rows in contact.
     least : float
         Smallest error that the force sensor resolves [force], above 0.
-    near : int
-        Number of distances that are weighted if the tool leaves the object.
     """
     moving, weight = np.flatnonzero(order), np.ones(len(path))
     if not len(moving):
@@ -268,7 +278,9 @@ def weights_behind_turns(
     def parts(turn: NDArray[np.intp], at_bottom: NDArray[np.bool_]) -> NDArray[np.intp]:
         """Returns the number of the end and of the distance (n,) of each row from the turn of its stroke."""
         distance = np.searchsorted(NEAR_TURN, np.abs(x - x[turn][stroke]))
-        return np.asarray(np.where(leaves & (distance >= near), FAR, distance) + (FAR + 1) * at_bottom)
+        return np.asarray(
+            np.where(leaves & (distance >= NEXT_TO_TURN), FAR, distance) + (FAR + 1) * at_bottom
+        )
 
     behind, before = parts(begins, way), parts(ends, ~way)
     if not (far := behind % (FAR + 1) == FAR).any():

@@ -208,12 +208,7 @@ def test_release_above_press_at_a_place_is_not_called_another_input() -> None:
 
 @pytest.mark.parametrize(
     ("release_from", "rows", "release_click", "width"),
-    [
-        (3.8, 20, 1.6, 0.15),
-        pytest.param(
-            3.6, 19, 1.4, 0.1, marks=pytest.mark.xfail(reason="a shift of the strokes is named as the cause")
-        ),
-    ],
+    [(3.8, 20, 1.6, 0.15), (3.6, 19, 1.4, 0.1)],
 )
 def test_few_rows_are_named_as_the_cause_when_only_rows_left_out_do_not_fit(
     release_from: float, rows: int, release_click: float, width: float

@@ -104,6 +104,28 @@ def test_rows_of_reversing_friction_do_not_make_a_steep_slope() -> None:
         assert slope.max() < 15.0  # the steepest of the object is 13.2
 
 
+def test_wavelets_do_not_imitate_a_play_between_the_tried_radii() -> None:
+    """Narrow wavelets fitted the reversals at the end of the travel: the slope of the release was five times
+    the true one, and no play radius was found."""
+
+    def foam(u: Array, s: Array | float) -> Array:
+        return np.where(u > 0.0, 0.4 * np.tanh(u / 0.1) + 0.2 * u + np.maximum(u, 0.0) ** 5, 0.0) * (
+            1.0 + 0.2 * s
+        )
+
+    cycle = np.r_[np.linspace(-0.02, 1.0, 400), np.linspace(1.0, -0.02, 400)]
+    u, at = np.tile(cycle, 2), np.linspace(0.0, 1.0, 4001)
+    force = foam(u, state(u, 0.02, 0.0)) + np.random.default_rng(0).normal(0.0, 2e-3, len(u))
+    model = identify(Recording.from_arrays(u, force, 0.01 * np.arange(len(u))))
+    assert model.play_radius == pytest.approx(0.02, rel=0.03)
+    assert model.n_wavelets <= 9
+    for side in (1.0, -1.0):
+        steepest = np.diff(foam(at, side)).max()
+        assert np.diff(model.force(at, direction=np.full(len(at), side))).max() == pytest.approx(
+            steepest, rel=0.1
+        )
+
+
 @pytest.mark.full
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
     """Press a little, release a little, while the mean advances: both strokes cover every position."""
