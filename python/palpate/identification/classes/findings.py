@@ -21,8 +21,9 @@ from ..data.rows import period_notes
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
+from ..network.separable import TINY
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate
+from ..search.evidence import Candidate, deviance
 from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_residual
 from .shift import shift_of
@@ -171,7 +172,9 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
     middle, unit = (worst % PLACES + 0.5) / PLACES, data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
-    reason = f"the force there depends on more than {_inputs(best.network)}, such as earlier motion: {more}"
+    reason = _loop_reason(best) or (
+        f"the force there depends on more than {_inputs(best.network)}, such as earlier motion: {more}"
+    )
     if best.side is not None and nonnegative:
         loop = (
             2.0 * best.parts_at(np.array([[middle]]))[1][0]
@@ -190,6 +193,40 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
             f"{noticed[worst]:.2g} just noticeable differences: {reason}"
         )
     ]
+
+
+def _loop_reason(best: Candidate) -> str:
+    """Returns why the rows differ from the model, if the position of the last turn explains their residuals:
+    the criterion falls by a line over it at each place and direction. An empty text without turns.
+
+    The height of a loop of plays in parallel has no minimum inside the loop (Masing 1926).
+    """
+    data, direction = best.data, strokes_from_order(best.data.path[:, 0])
+    if direction is None:
+        return ""
+    rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
+    weight, group = best.settled.weight[rows], _places(data.box[rows], direction[rows])
+    turned = np.diff(direction[rows], prepend=0) != 0
+    values = data.path[rows[turned], 0][np.cumsum(turned) - 1], best.residual[rows]
+    means = _means(group, weight, *values)
+    turn, residual = (each - mean[group] for each, mean in zip(values, means, strict=True))
+    cross, square = (np.bincount(group, weight * turn * each) for each in (residual, turn))
+    known, n = square > np.finfo(float).eps * len(rows), best.problem.independent
+    before = float(weight @ residual**2)
+    after = before - float(np.sum(cross[known] ** 2 / square[known]))
+    criterion = [deviance("bic", max(rss, TINY), n, p) for rss, p in ((after, int(known.sum())), (before, 0))]
+    if criterion[0] >= criterion[1]:
+        return ""
+    pinched = ""
+    if best.strokes is not None:
+        height = best.parts_at(np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None])[1]
+        sides = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
+        if np.max(np.minimum(*sides) - height) > MOST_JND * _floor(best):
+            pinched = ", and the loops narrow inside (pinching)"
+    return (
+        f"the force there depends on the position of the last turn{pinched}. Cure: identify the cycles of "
+        "each amplitude separately, with --rows"
+    )
 
 
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
@@ -213,8 +250,10 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     if not perceptible and rms < best.error.rmse:
         return None
     amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
-    if shift.late:
+    if shift.late and 2.0 * shift.without.rmse**2 <= shift.before**2:
         amount, lag_s = f"a force that is about {1e3 * shift.amount:.3g} ms late", shift.amount
+    elif shift.late:  # the lag is not the only cause of the error, and its correction can raise it
+        amount = "a late force"
     causes = shifted_strokes(bool(data.parts), lag_s)
     return ShiftEffect(
         rms / spread,

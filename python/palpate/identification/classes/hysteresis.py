@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._typing import Float1D
 from ...errors import InputError
 from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
@@ -42,6 +43,10 @@ RADIUS_TOLERANCE = 1e-3
 RADIUS_SEARCH_RATIO = 2.0
 """A search tries play radii between the best radius so far divided by this ratio and that radius times this
 ratio [-]."""
+
+REVERSAL = 0.12
+"""Distance from a turn up to which no row is fitted by the wavelets that show the play radius [travel]: the
+friction of the largest radius reverses in it. With twice this distance, few rows are left."""
 
 REWEIGHTINGS = 5
 """Number of fits of given wavelets, each with the weights that follow from the fit before."""
@@ -277,29 +282,30 @@ class PlaySearch:
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def settled(self, order: HysteresisInput) -> HysteresisInput:
-        """Returns the directions of the rows at which every tried play has reversed."""
+        """Returns the directions of the rows behind reversals."""
         fitted = order.side * self._samples.data.fitted
-        return replace(order, known=settled_rows(self._path, fitted, 2.0 * self._radii[-1]))
+        return replace(order, known=settled_rows(self._path, fitted, REVERSAL))
 
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given
         wavelets is smaller than at its neighbours, and than that of the order of rows.
 
-        Where the order of rows is known, the smallest and the largest of three or more radii are not
-        returned: the error can fall further beyond them. Returns none if the motions between gaps of time
-        are too short for every play radius, or never reverse: with one stroke only the sum g + h is
-        determined.
+        The error can fall further beyond the smallest and the largest of three or more radii. Where the order
+        of rows is known, the smallest is not returned, and the largest only if the tool turns at different
+        places: else wavelets there fit as much. Returns none if the motions between gaps of time are too
+        short for every play radius, or never reverse: with one stroke only the sum g + h is determined.
         """
         if not self._usable:
             return []
         known, order, least = self._thinned(self._usable[-1]), self._samples.data.order, math.inf
-        beyond = math.inf
+        below = beyond = math.inf
         if order is not None:
             known &= order != 0.0
             least = self._residual_squares(HysteresisInput(order, known), basis, known)
-            beyond = 0.0 if len(self._usable) > 2 else math.inf
+            if len(self._usable) > 2:
+                below, beyond = 0.0, math.inf if self._turns_apart(order) else 0.0
         errors = [self._residual_squares(each, basis, known) for each in self._usable]
-        errors = [beyond, *errors, beyond]
+        errors = [below, *errors, beyond]
         return [
             strokes
             for strokes, before, error, after in zip(
@@ -329,6 +335,13 @@ class PlaySearch:
         )
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
+
+    def _turns_apart(self, order: Float1D) -> bool:
+        """True if the tool, whose rows have the directions `order` (n,), turns at places that are further
+        apart than the way in which friction reverses."""
+        moving = np.flatnonzero(order)
+        at = self._path[moving[:-1]][np.diff(order[moving]) != 0.0]
+        return any(np.ptp(ends) > REVERSAL for ends in (at[::2], at[1::2]) if len(ends))
 
     def _of(self, radius: float) -> HysteresisInput:
         return HysteresisInput.of_play(np.split(self._path, self._starts[1:]), radius)

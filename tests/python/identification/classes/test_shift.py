@@ -98,3 +98,14 @@ def test_the_line_of_the_error_states_the_shift(tmp_path: Path, capsys: pytest.C
     path = recorded(40e-6).write(tmp_path / "button.csv")
     assert main(["identify", str(path), "-o", str(tmp_path / "button.json")]) == 0
     assert "if press and release are shifted" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_lag_that_leaves_most_of_the_error_has_no_number() -> None:
+    """The zero of the force moved; the correction of the lag raised the error."""
+    time, random = 0.002 * np.arange(4000), np.random.default_rng(0)
+    x = 0.5 - 0.5 * np.cos(np.pi * time)
+    force = np.interp(time - 0.02, time, 3.0 * x + x**3) + 0.5 * (time > 3.0)
+    model = palpate.identify(Recording.from_arrays(x, force + random.normal(0.0, 0.01, len(x)), time))
+    (reason,) = (each for each in model.verdict.reasons if "shifted against each other" in each)
+    assert "by a late force" in reason
+    assert "give --force-late-s SECONDS" in reason

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Objects whose loops grow with the distance moved: the verdict names what no model class describes."""
+
+from bench.identification.growing_loops import measured
+
+
+def test_loops_that_narrow_at_their_middle_are_called_pinched() -> None:
+    found = measured("Bouc-Wen, pinched", 3)
+    assert found["verdict"] == "usable"
+    assert "depends on the position of the last turn" in found["reason"]
+    assert "pinching" in found["reason"]
