@@ -101,7 +101,7 @@ def test_the_line_of_the_error_states_the_shift(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_lag_that_leaves_most_of_the_error_has_no_number() -> None:
-    """The zero of the force moved; the correction of the lag raised the error."""
+    """The zero of the force moved too, so the best lag is 33 ms in place of 20 ms."""
     time, random = 0.002 * np.arange(4000), np.random.default_rng(0)
     x = 0.5 - 0.5 * np.cos(np.pi * time)
     force = np.interp(time - 0.02, time, 3.0 * x + x**3) + 0.5 * (time > 3.0)
