@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -153,6 +153,34 @@ def _means(place: NDArray[np.intp], weight: Float1D, *values: Float1D) -> list[F
     return [np.bincount(place, weight * each, 2 * PLACES) / total for each in values]
 
 
+@dataclass(frozen=True)
+class _Strokes:
+    """Rows of strokes, to compare those in the same direction over the same place."""
+
+    rows: NDArray[np.intp]
+    """(k,) indices of the rows with a weight"""
+    weight: Float1D
+    """(k,)"""
+    group: NDArray[np.intp]
+    """(k,) number of the place and the direction"""
+    number: NDArray[np.intp]
+    """(k,) number of the stroke"""
+
+    @classmethod
+    def of(cls, best: Candidate) -> _Strokes | None:
+        """Returns the rows of strokes in recorded order; None without strokes."""
+        if (direction := strokes_from_order(best.data.path[:, 0])) is None:
+            return None
+        rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
+        group = _places(best.data.box[rows], direction[rows])
+        number = np.cumsum(np.diff(direction[rows], prepend=0) != 0) - 1
+        return cls(rows, best.settled.weight[rows], group, number)
+
+    def centred(self, values: Float1D) -> Float1D:
+        """Returns values (k,) minus their weighted mean at each place and direction."""
+        return values - _means(self.group, self.weight, values)[0][self.group]
+
+
 def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
     hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
@@ -201,17 +229,12 @@ def _loop_reason(best: Candidate) -> str:
 
     The height of a loop of plays in parallel has no minimum inside the loop (Masing 1926).
     """
-    data, direction = best.data, strokes_from_order(best.data.path[:, 0])
-    if direction is None:
+    if (strokes := _Strokes.of(best)) is None:
         return ""
-    rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
-    weight, group = best.settled.weight[rows], _places(data.box[rows], direction[rows])
-    turned = np.diff(direction[rows], prepend=0) != 0
-    values = data.path[rows[turned], 0][np.cumsum(turned) - 1], best.residual[rows]
-    means = _means(group, weight, *values)
-    turn, residual = (each - mean[group] for each, mean in zip(values, means, strict=True))
-    cross, square = (np.bincount(group, weight * turn * each) for each in (residual, turn))
-    known, n = square > np.finfo(float).eps * len(rows), best.problem.independent
+    first, weight = strokes.rows[np.searchsorted(strokes.number, strokes.number)], strokes.weight
+    turn, residual = strokes.centred(best.data.path[first, 0]), strokes.centred(best.residual[strokes.rows])
+    cross, square = (np.bincount(strokes.group, weight * turn * each) for each in (residual, turn))
+    known, n = square > np.finfo(float).eps * len(weight), best.problem.independent
     before = float(weight @ residual**2)
     after = before - float(np.sum(cross[known] ** 2 / square[known]))
     criterion = [deviance("bic", max(rss, TINY), n, p) for rss, p in ((after, int(known.sum())), (before, 0))]
@@ -293,16 +316,12 @@ def energy_findings(best: Candidate) -> list[Finding]:
 def drift_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if the residual changes over the recording by more than a just noticeable difference,
     between strokes in the same direction over the same place. One press and release cannot show this."""
-    data, direction = best.data, strokes_from_order(best.data.path[:, 0])
-    if len(data.names) > 1 or data.repeats is not None or direction is None:
+    data = best.data
+    if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
         return []
-    rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
-    weight, group = best.settled.weight[rows], _places(data.box[rows], direction[rows])
-    stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
-    middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
-    values = middle, best.residual[rows]
-    means = _means(group, weight, *values)
-    moment, residual = (each - mean[group] for each, mean in zip(values, means, strict=True))
+    rows, number, weight = strokes.rows, strokes.number, strokes.weight
+    middle = (np.bincount(number, rows) / np.bincount(number))[number] / len(data.force)
+    moment, residual = strokes.centred(middle), strokes.centred(best.residual[rows])
     squares = float(weight @ moment**2)
     if not squares > np.finfo(float).eps * len(rows):
         return []

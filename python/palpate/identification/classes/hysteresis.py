@@ -17,7 +17,13 @@ from ...errors import InputError
 from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
 from ..data.limits import evenly_spread
-from ..data.strokes import LEAST_KNOWN_SHARE, HysteresisInput, settled_rows, weights_behind_turns
+from ..data.strokes import (
+    LEAST_KNOWN_SHARE,
+    HysteresisInput,
+    settled_rows,
+    turns_before,
+    weights_behind_turns,
+)
 from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
 from ..network.constraints import impose
@@ -298,14 +304,13 @@ class PlaySearch:
         if not self._usable:
             return []
         known, order, least = self._thinned(self._usable[-1]), self._samples.data.order, math.inf
-        below = beyond = math.inf
+        first = last = math.inf
         if order is not None:
             known &= order != 0.0
             least = self._residual_squares(HysteresisInput(order, known), basis, known)
             if len(self._usable) > 2:
-                below, beyond = 0.0, math.inf if self._turns_apart(order) else 0.0
-        errors = [self._residual_squares(each, basis, known) for each in self._usable]
-        errors = [below, *errors, beyond]
+                first, last = 0.0, math.inf if self._turns_apart(order) else 0.0
+        errors = [first, *(self._residual_squares(each, basis, known) for each in self._usable), last]
         return [
             strokes
             for strokes, before, error, after in zip(
@@ -339,8 +344,7 @@ class PlaySearch:
     def _turns_apart(self, order: Float1D) -> bool:
         """True if the tool, whose rows have the directions `order` (n,), turns at places that are further
         apart than the way in which friction reverses."""
-        moving = np.flatnonzero(order)
-        at = self._path[moving[:-1]][np.diff(order[moving]) != 0.0]
+        at = self._path[turns_before(order)[2][1:]]
         return any(np.ptp(ends) > REVERSAL for ends in (at[::2], at[1::2]) if len(ends))
 
     def _of(self, radius: float) -> HysteresisInput:

@@ -224,16 +224,26 @@ NEXT_TO_TURN = 2
 """Number of distances, from the smallest one, next to a turn."""
 
 
+def turns_before(order: Float1D) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Returns the rows of strokes (k,), the number of the stroke of each (k,), and the row of the turn before
+    each stroke (strokes,).
+
+    This is the last row of the stroke before, or the first row. `order` (n,) holds directions, 0 for rows of
+    no stroke.
+    """
+    moving = np.flatnonzero(order)
+    begins = np.diff(order[moving], prepend=0.0) != 0.0
+    return moving, np.cumsum(begins) - 1, moving[np.maximum(np.flatnonzero(begins) - 1, 0)]
+
+
 def settled_rows(path: Float1D, order: Float1D, distance: float) -> NDArray[np.bool_]:
     """Returns True (n,) for rows of a stroke that are further behind its turn than a distance [travel].
 
     `path` (n,) holds positions in recorded order [travel], `order` (n,) directions, 0 for rows of no stroke.
     """
-    moving, settled = np.flatnonzero(order), np.zeros(len(path), dtype=bool)
-    x, way = path[moving], order[moving] > 0.0
-    first = np.diff(way, prepend=not way[:1]) != 0
-    turn = np.maximum(np.flatnonzero(first) - 1, 0)[np.cumsum(first) - 1]
-    settled[moving] = np.abs(x - x[turn]) > distance
+    moving, stroke, turns = turns_before(order)
+    settled = np.zeros(len(path), dtype=bool)
+    settled[moving] = np.abs(path[moving] - path[turns][stroke]) > distance
     return settled
 
 
@@ -266,18 +276,16 @@ def weights_behind_turns(
     least : float
         Smallest error that the force sensor resolves [force], above 0.
     """
-    moving, weight = np.flatnonzero(order), np.ones(len(path))
+    (moving, stroke, begins), weight = turns_before(order), np.ones(len(path))
     if not len(moving):
         return weight
     x, way, square = path[moving], order[moving] > 0.0, residual[moving] ** 2 + least**2
-    turns = np.diff(way, prepend=not way[0])
-    stroke, first = np.cumsum(turns) - 1, np.flatnonzero(turns)
-    begins, ends = np.maximum(first - 1, 0), np.append(first[1:], len(x)) - 1
-    leaves = not touched[moving][ends].all()
+    ends = np.append(begins[1:], moving[-1])
+    leaves = not touched[ends].all()
 
     def parts(turn: NDArray[np.intp], at_bottom: NDArray[np.bool_]) -> NDArray[np.intp]:
         """Returns the number of the end and of the distance (n,) of each row from the turn of its stroke."""
-        distance = np.searchsorted(NEAR_TURN, np.abs(x - x[turn][stroke]))
+        distance = np.searchsorted(NEAR_TURN, np.abs(x - path[turn][stroke]))
         return np.asarray(
             np.where(leaves & (distance >= NEXT_TO_TURN), FAR, distance) + (FAR + 1) * at_bottom
         )
