@@ -256,6 +256,7 @@ RULES = (
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("radius of strokes without reversals", f"{CLASSES}.hysteresis", "settled_rows", _moves),
+    Rule("reversals end after 12 %, not 24 %", f"{CLASSES}.hysteresis", "REVERSAL", 0.24),
     Rule("largest radius needs turns apart", f"{CLASSES}.hysteresis", "PlaySearch._turns_apart", _one),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{CLASSES}.hysteresis", "weights_behind_turns", _whole),
