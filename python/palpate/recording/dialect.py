@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 from ..errors import InputError, escaped, listed, shortened
@@ -492,7 +492,7 @@ def decimal_mark(where: str, rows: Sequence[Row]) -> str:
     InputError
         A comma may be a decimal comma or a thousands separator, or both marks occur as decimal marks.
     """
-    cells = [cell.strip() for row in rows for cell in row if is_number(cell)]
+    cells = [cell.strip() for cell in dict.fromkeys(chain.from_iterable(rows)) if is_number(cell)]
     for decimal in {_proven_mark(_MARKS.sub("", cell)) for cell in cells} - {""}:
         marks = decimal + _OTHER[decimal]
         if all(parse_with(cell, marks) is not None for cell in cells):
@@ -553,7 +553,8 @@ def _unknown_mark(finding: str, possible: Iterable[str]) -> InputError:
 
 def is_number(cell: str) -> bool:
     """Returns True if a cell is a number with any decimal mark and any mark between thousands."""
-    return any(parse_with(cell.strip(), marks) is not None for marks in (".,", ",."))
+    word = cell.strip()
+    return parse_with(word, ".,") is not None or parse_with(word, ",.") is not None
 
 
 def _is_data(row: Row) -> bool:

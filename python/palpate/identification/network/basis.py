@@ -7,6 +7,7 @@ with V voices psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the sa
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -70,7 +71,7 @@ class Basis:
         """Number of wavelets and orders of harmonics."""
         return self.hats + self.harmonics // 2
 
-    @property
+    @cached_property
     def used(self) -> NDArray[np.bool_]:
         """True (N, d) for the inputs with a fitted dilation and translation of each wavelet; harmonics have
         none."""
@@ -105,7 +106,7 @@ class Basis:
         return Basis(both(self.alpha, other.alpha), both(self.beta, other.beta), harmonics)
 
     def without_harmonics(self) -> "Basis":
-        return Basis(self.alpha[: self.hats], self.beta[: self.hats])
+        return self if self.harmonics == 0 else Basis(self.alpha[: self.hats], self.beta[: self.hats])
 
     def without(self, index: int) -> "Basis":
         """Returns the basis without one of its `size` wavelets or orders."""
@@ -126,8 +127,7 @@ class Resolution:
 
     def __init__(self, positions: Float2D) -> None:
         self._positions = positions[distinct_rows(positions)[0]]
-        self._over: dict[int, _Neighbours] = {}
-        """Positions over each set of inputs, by the sum of 2^k over these inputs k"""
+        self._neighbours: dict[int, _Neighbours] = {}
 
     def __len__(self) -> int:
         return len(self._positions)
@@ -145,14 +145,21 @@ class Resolution:
         Distances and distinct positions are those over the inputs that the wavelet uses. The radius is
         infinite if there are fewer positions.
         """
+        if self._positions.shape[1] == 1:
+            return self._over(1).reach(basis.beta, count)
         bits = 1 << np.arange(basis.beta.shape[1])
         subset, radius = basis.used @ bits, np.empty(len(basis))
         for code in np.unique(subset):
             inputs, those = np.flatnonzero(code & bits), subset == code
-            if (near := self._over.get(int(code))) is None:
-                near = self._over[int(code)] = _Neighbours(self._positions[:, inputs])
-            radius[those] = near.reach(basis.beta[those][:, inputs], count)
+            radius[those] = self._over(int(code)).reach(basis.beta[those][:, inputs], count)
         return radius
+
+    def _over(self, code: int) -> "_Neighbours":
+        """Returns the positions over a set of inputs k, given by the sum of 2^k."""
+        if code not in self._neighbours:
+            inputs = [k for k in range(self._positions.shape[1]) if code >> k & 1]
+            self._neighbours[code] = _Neighbours(self._positions[:, inputs])
+        return self._neighbours[code]
 
 
 MOST_TREE_INPUTS = 3
@@ -177,6 +184,7 @@ class _Neighbours:
         self._sorted = distinct[:, 0] if d == 1 else None
         self._tree = scipy.spatial.cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
         self._size = len(distinct)
+        self._radii: dict[int, tuple[Float1D, Float1D]] = {}
 
     def reach(self, places: Float2D, count: int) -> Float1D:
         """Returns the radius (N,) around each place (N, d) that contains `count` positions; infinite if there
@@ -190,13 +198,31 @@ class _Neighbours:
         if self._sorted is None:
             square = scipy.spatial.distance.cdist(places, self._positions, "sqeuclidean")
             return np.asarray(np.sqrt(np.partition(square, count - 1, axis=1)[:, count - 1]))
-        # On a line the nearest positions are neighbours in order: test all windows of `count` positions at
-        # the place.
-        last = self._size - count
-        first = np.searchsorted(self._sorted, places[:, 0])[:, None] - np.arange(count + 1)
-        first = np.clip(first, 0, last)
-        left, right = self._sorted[first], self._sorted[first + count - 1]
-        return np.asarray(np.maximum(places - left, right - places).min(axis=1))
+        if count not in self._radii:
+            self._radii[count] = _radii_on_a_line(self._sorted, count)
+        return np.interp(places[:, 0], *self._radii[count])
+
+
+FURTHEST_PLACE = 10.0
+"""Largest distance of a place from the positions [range of recorded positions]"""
+
+
+def _radii_on_a_line(positions: Float1D, count: int) -> tuple[Float1D, Float1D]:
+    """Returns places (k,) and the radius (k,) around each that contains `count` of the sorted positions.
+
+    Between these places the radius is linear: it is least in the middle of `count` neighbours, and largest
+    halfway between the first and the last of one more.
+    """
+    few, more = len(positions) - count + 1, len(positions) - count
+    places, radii = np.empty((2, few + more))
+    for part, size, last in ((slice(0, None, 2), few, count - 1), (slice(1, None, 2), more, count)):
+        left, right = positions[:size], positions[last:]
+        places[part], radii[part] = 0.5 * (left + right), 0.5 * (right - left)
+    beyond = FURTHEST_PLACE * np.array([-1.0, 1.0])
+    return (
+        np.concatenate([places[:1] + beyond[0], places, places[-1:] + beyond[1]]),
+        np.concatenate([radii[:1] - beyond[0], radii, radii[-1:] + beyond[1]]),
+    )
 
 
 COARSEST_CANDIDATE = 1.0

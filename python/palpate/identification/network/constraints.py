@@ -261,19 +261,18 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     non-negative least squares solves (Lawson & Hanson 1974, chapter 23).
     """
     start = free.coefficients.ravel()
-    factors, norms = zip(*[factored(gram) for gram in free.grams], strict=True)
-    factor, norm = np.tril(scipy.linalg.block_diag(*factors)), np.concatenate(norms)
-    reach = scipy.linalg.solve_triangular(factor, (rows / norm).T, lower=True)
+    factor = np.tril(scipy.linalg.block_diag(*map(factored, free.grams)))
+    reach = scipy.linalg.solve_triangular(factor, rows.T, lower=True)
     missing = limits - rows @ start
     size = np.abs(missing).max()
-    target = np.zeros(len(norm) + 1)
+    target = np.zeros(len(start) + 1)
     target[-1] = 1.0
     multipliers, _ = scipy.optimize.nnls(
         np.vstack([reach, missing / size]), target, maxiter=50 * len(limits) + 100
     )
     share = max(1.0 - float(multipliers @ missing) / size, float(np.finfo(float).eps))
     step = scipy.linalg.solve_triangular(factor, reach @ multipliers * (size / share), lower=True, trans="T")
-    return np.asarray(start + step / norm).reshape(free.coefficients.shape)
+    return np.asarray(start + step).reshape(free.coefficients.shape)
 
 
 def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:

@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 import scipy
@@ -40,37 +41,32 @@ any noise."""
 
 
 def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solves a positive semidefinite linear system by a Cholesky factorisation on columns of unit norm."""
-    factor, norm = factored(gram)
-    columns = right.reshape(len(gram), -1) / norm[:, None]
-    solved, _ = scipy.linalg.lapack.dpotrs(factor, columns, lower=1)
-    return np.asarray(solved / norm[:, None]).reshape(right.shape)
+    """Solves a positive semidefinite linear system by a Cholesky factorisation."""
+    solved, _ = scipy.linalg.lapack.dpotrs(factored(gram), right, lower=1)
+    return np.asarray(solved).reshape(right.shape)
 
 
 def half_solved(gram: Float2D, right: Float2D) -> Float2D:
     """Returns M @ right, where M' M is the inverse of the system matrix; inner products of results are those
     of projections."""
-    factor, norm = factored(gram)
-    solved, _ = scipy.linalg.lapack.dtrtrs(factor, right / norm[:, None], lower=1)
+    solved, _ = scipy.linalg.lapack.dtrtrs(factored(gram), right, lower=1)
     return np.asarray(solved)
 
 
-def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
-    """Returns the factor L and `norm` with gram = D L L' D, D = diag(norm); only the lower triangle of L is
-    valid.
+def factored(gram: Float2D) -> Float2D:
+    """Returns the factor L with gram = L L'; only the lower triangle of L is valid.
 
-    The ridge is raised until the factorisation succeeds.
+    The ridge is raised until the factorisation succeeds. The rounding error of the factorisation does not
+    depend on the units of the columns (Demmel 1989).
     """
-    norm = np.sqrt(np.diag(gram))
-    norm = np.where(norm > 0.0, norm, 1.0)
-    scaled = gram / (norm[:, None] * norm)
-    diagonal = np.einsum("ii->i", scaled)
-    unit, ridge = diagonal.copy(), RIDGE
+    ridged = gram.copy()
+    diagonal = np.einsum("ii->i", ridged)
+    unit, ridge = np.where(diagonal > 0.0, diagonal, 1.0), RIDGE
     while True:
-        diagonal[:] = unit + ridge
-        factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1)
+        diagonal[:] = (1.0 + ridge) * unit
+        factor, failed = scipy.linalg.lapack.dpotrf(ridged, lower=1)
         if not failed:
-            return factor, norm
+            return np.asarray(factor)
         ridge *= 100.0
 
 
@@ -117,7 +113,8 @@ class Block:
         exp(-alpha^2 scatter / 2), to second order in their distance from it.
         """
         columns = basis.columns(self.positions)
-        columns[:, basis.hats :] *= np.exp(-0.5 * self.scatter * basis.alpha[basis.hats :, 0] ** 2)
+        if basis.harmonics:
+            columns[:, basis.hats :] *= np.exp(-0.5 * self.scatter * basis.alpha[basis.hats :, 0] ** 2)
         return columns
 
     @property
@@ -327,13 +324,14 @@ class SeparableProblem:
             for block, design, table in zip(self.blocks, designs, self._tables(coefficients), strict=True)
         )
         rss = float(sum(residual @ residual for residual in residuals))
-        penalty = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
+        weights = coefficients[:, 1 + self.dimension :]
+        penalty = self.prior * float(np.vdot(weights, weights))
         return Solution(basis, coefficients, rss, rss + penalty, designs, grams, residuals)
 
     def _tables(self, coefficients: Float2D) -> list[Float2D]:
         """Returns the bias, slopes and weights of the channels of each block of rows."""
-        ends = np.cumsum([block.n_channels for block in self.blocks])
-        return np.split(coefficients, ends[:-1])
+        counts = [block.n_channels for block in self.blocks]
+        return [coefficients[end - n : end] for n, end in zip(counts, accumulate(counts), strict=True)]
 
     def normal_equations(self, at: Solution) -> tuple[Float2D, Float1D]:
         """Returns the Gauss-Newton matrix and the descent direction of variable projection at a solution.
@@ -353,8 +351,7 @@ class SeparableProblem:
         ):
             jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta, basis.used)
             slope = table[:, 1 + self.dimension :].T @ block.channels.T
-            for column, i in zip(jacobian.T, (*wavelet, *wavelet), strict=True):
-                column *= slope[i]
+            jacobian.T[...] *= slope[np.tile(wavelet, 2)]
             cross = design.T @ jacobian
             spanned = half_solved(gram, cross)
             matrix += jacobian.T @ jacobian - spanned.T @ spanned
@@ -477,33 +474,26 @@ def _bounded_step(
 ) -> Float1D:
     """Returns the Levenberg-Marquardt step of dilations and translations; a value at its bound does not move
     further."""
-    d = basis.alpha.shape[1]
-    used = np.stack([basis.used.T, basis.used.T]).ravel()
-    push = np.zeros(len(used))
-    push[used] = gradient
-    push_alpha, push_beta = push.reshape(2, d, len(basis)).transpose(0, 2, 1)
-    held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
-    held_alpha |= (push_alpha < 0) & (basis.alpha <= LEAST_DILATION * (1 + 1e-9))
-    held_beta = (push_beta > 0) & (basis.beta >= 1 + LARGEST_OVERHANG) | (push_beta < 0) & (
-        basis.beta <= -LARGEST_OVERHANG
-    )
-    moves = ~np.stack([held_alpha.T, held_beta.T]).ravel()
-    free = np.flatnonzero(moves[used])
-    step = np.zeros(len(used))
+    used = basis.used.T
+    above = [basis.alpha >= finest * (1 - 1e-9), basis.beta >= 1 + LARGEST_OVERHANG]
+    below = [basis.alpha <= LEAST_DILATION * (1 + 1e-9), basis.beta <= -LARGEST_OVERHANG]
+    held_above, held_below = (np.concatenate([each.T[used] for each in held]) for held in (above, below))
+    free = np.flatnonzero(~np.where(gradient > 0, held_above, held_below))
+    step = np.zeros(2 * used.size)
     if len(free) == 0:
         return step
-    system = matrix[np.ix_(free, free)]
-    diagonal = np.diag(system)
-    floor = 1e-6 * diagonal.max() + np.finfo(float).tiny
+    system = matrix[free[:, None], free]
+    diagonal = system.diagonal().copy()
+    floor = 1e-6 * diagonal.max() + TINY
     while True:
-        damped = system.copy()
-        np.einsum("ii->i", damped)[:] += step_damping * np.maximum(diagonal, floor)
-        factor, failed = scipy.linalg.lapack.dpotrf(damped, lower=1)
+        system.flat[:: len(free) + 1] = diagonal + step_damping * np.maximum(diagonal, floor)
+        factor, failed = scipy.linalg.lapack.dpotrf(system, lower=1)
         if not failed:
             break
         step_damping = 10.0 * step_damping + 1e-12
-    step[np.flatnonzero(used)[free]] = scipy.linalg.lapack.dpotrs(factor, gradient[free], lower=1)[0]
-    return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+    found, _ = scipy.linalg.lapack.dpotrs(factor, gradient[free], lower=1)
+    step[np.flatnonzero([used, used])[free]] = np.clip(found, -LONGEST_STEP, LONGEST_STEP)
+    return step
 
 
 def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basis, Float2D]:
@@ -512,7 +502,7 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
     beta = np.clip(basis.beta + shift / basis.alpha, -LARGEST_OVERHANG, 1 + LARGEST_OVERHANG)
     used = basis.used
-    moved = replace(basis, beta=np.where(used, beta, basis.beta))
+    moved = Basis(basis.alpha, np.where(used, beta, basis.beta), basis.harmonics)
     finest = problem.finest(moved)
     alpha = np.clip(basis.alpha * np.exp(grow), LEAST_DILATION, np.maximum(finest, LEAST_DILATION))
-    return replace(moved, alpha=np.where(used, alpha, basis.alpha)), finest
+    return Basis(np.where(used, alpha, basis.alpha), moved.beta, basis.harmonics), finest
