@@ -27,11 +27,8 @@ from .search import needed
 _STRUCTURES = ("direct", "tangent")
 """Structures that render the negative of a force without a change of its shape, the simplest first"""
 
-_BISECTIONS = 14
-"""Number of bisections of the scale, which find it within 1e-4"""
-
 _STEP = 1e-3
-"""Step of a printed scale, which is rounded down so that it is proved [-]"""
+"""Step of the scale [-]"""
 
 
 def compensate(
@@ -111,13 +108,12 @@ def _largest(task_of: Callable[[float], Task], structure: str) -> tuple[float, C
     whole = proposed(1.0)
     if holds(whole):
         return 1.0, whole
-    low, high = 0.0, 1.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(proposed(middle)) else (low, middle)
-    scale = np.floor(low / _STEP) * _STEP
-    last = proposed(scale) if scale > 0.0 else whole
-    return (float(scale), last) if holds(last) else (0.0, whole)
+    low, high, found = 0, round(1.0 / _STEP), whole
+    while high - low > 1:
+        middle = (low + high) // 2
+        outcome = proposed(middle * _STEP)
+        low, high, found = (middle, high, outcome) if holds(outcome) else (low, middle, found)
+    return low * _STEP, found
 
 
 def _compensation(model: Model, device: DeviceProfile, scale: float) -> Model:

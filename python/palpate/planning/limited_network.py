@@ -311,18 +311,20 @@ def _chosen(
 
     line = both(np.column_stack([ones, x]), np.column_stack([zeros, ones]))
     always = np.concatenate([line, wavelets(before)], axis=1)
-    columns = wavelets(candidates)
     basis = np.linalg.qr(always)[0]
     residual = targets - basis @ (basis.T @ targets)
+    rest, sufficient = float(np.square(residual).sum()), residual.size * close**2
+    if rest <= sufficient:
+        return []
+    columns = wavelets(candidates)
     left = columns - basis @ (basis.T @ columns)
     norms = np.square(columns).sum(axis=0)
     # Each step extends a pivoted Cholesky factor of the candidates' Gram matrix.
     gram, products = left.T @ left, left.T @ residual
     size = np.diag(gram).copy()
-    rest = float(np.square(residual).sum())
     factor = np.empty((_MOST_WAVELETS, len(size)))
     chosen: list[int] = []
-    while len(chosen) < _MOST_WAVELETS and rest > residual.size * close**2:
+    while len(chosen) < _MOST_WAVELETS and rest > sufficient:
         new = size > _LEAST_NEW_SHARE * norms
         gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
         best = int(np.argmax(gains))

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -354,6 +355,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
     device = task.device
     task = replace(task, may_limit=False, predict=task.predict or 0)
 
+    @cache  # improvements are rounded, so devices repeat
     def fits(changed: DeviceProfile) -> bool:
         for name in names:
             outcome = CANDIDATES[name].propose(replace(task, device=changed))
