@@ -16,7 +16,12 @@ from palpate.cli.main import main
 for slow in (
     "bokeh.plotting",
     "matplotlib.figure",
+    "mcap.writer",
+    "palpate.cli.figures",
     "palpate.export.fmu",
+    "palpate.plotting",
+    "palpate.report",
+    "pandas",
     "scipy.interpolate",
     "scipy.ndimage",
     "scipy.signal",
