@@ -14,13 +14,11 @@ from typing import Any
 from palpate.cli.main import main
 
 for slow in (
-    "bokeh.plotting",
     "matplotlib.figure",
     "mcap.writer",
     "palpate.cli.figures",
     "palpate.export.fmu",
     "palpate.plotting",
-    "palpate.report",
     "pandas",
     "scipy.interpolate",
     "scipy.ndimage",
@@ -49,6 +47,8 @@ def run(request: dict[str, Any]) -> int:
 for line in sys.stdin:
     started = []
     for given in json.loads(line):
+        if given["arguments"][0] == "report":
+            importlib.import_module("bokeh.plotting")
         child = os.fork()
         if child == 0:
             os._exit(run(given))

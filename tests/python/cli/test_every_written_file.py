@@ -284,7 +284,7 @@ def calls_to_fault(ended: Ended, name: str, seed: int) -> list[int]:
     return sorted({*chosen, *kinds.values()} if SCALE > 1 else chosen)
 
 
-@cases(SAMPLE | {"render", "report"}, sorted(CASES.keys() - SLOW))
+@cases(SAMPLE | {"render"}, sorted(CASES.keys() - SLOW))
 def test_after_kill_each_file_is_old_or_complete(
     programs: Programs, name: str, folder: Path, tmp_path: Path
 ) -> None:
