@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Test fixtures: the folder of measured recordings, small recording files, a terminal; samples of cases."""
 
+import ast
 import gc
 import os
 import pty
@@ -8,6 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,12 @@ def sampled(cases: Iterable[Any], *kept: Any) -> list[Any]:
         return pytest.param(*values, marks=pytest.mark.full)
 
     return [case if case in kept else of_the_full_run(case) for case in cases]
+
+
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """Returns all nodes of the syntax tree of a Python file, the module first."""
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 def measured_data() -> Path | None:

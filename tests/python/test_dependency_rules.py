@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from conftest import nodes_of
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "palpate"
 HEADERS = ROOT / "cpp" / "include" / "palpate"
@@ -118,8 +120,7 @@ def imported_modules(path: Path) -> set[str]:
     """
     package_parts = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
     found = set()
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
+    for node in nodes_of(path):
         targets: list[tuple[str, ...]] = []
         if isinstance(node, ast.Import):
             targets = [tuple(alias.name.split(".")) for alias in node.names]

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, nodes_of
 from palpate import DeviceProfile, Scheme
 from palpate._core.rendering import structure_names
 from palpate.cli.main import palpate
@@ -72,7 +72,7 @@ def test_no_other_file_lists_structures_or_profile_fields(names: list[str], larg
     files_with_list = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes_of(path)
         if isinstance(node, (ast.Dict, ast.List, ast.Set, ast.Tuple))
         and len(set(names) & strings_in(node)) > largest_overlap
     }

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from conftest import nodes_of
+
 PACKAGE = Path(__file__).parents[2] / "python" / "palpate"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -50,8 +52,7 @@ def targets_of(path: Path, node: ast.Import | ast.ImportFrom) -> list[str]:
 @cache
 def imports_of(path: Path) -> set[str]:
     """Returns what all import statements of a file load."""
-    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    imports = [node for node in nodes_of(path) if isinstance(node, (ast.Import, ast.ImportFrom))]
     return {target for node in imports for target in targets_of(path, node)}
 
 
@@ -61,10 +62,9 @@ def is_late(target: str) -> bool:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     forbidden = {
         target
-        for function in ast.walk(tree)
+        for function in nodes_of(path)
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
         for node in ast.walk(function)
         if isinstance(node, (ast.Import, ast.ImportFrom))
@@ -82,7 +82,7 @@ def test_a_module_of_scipy_is_loaded_by_its_first_use(path: Path) -> None:
 
 def imported_modules(path: Path, all_modules: set[str]) -> set[str]:
     """Returns the modules of palpate that a file imports, in functions too, except for type checking."""
-    pending: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    pending: list[ast.AST] = [nodes_of(path)[0]]
     modules = set()
     while pending:
         node = pending.pop()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, nodes_of
 from palpate.cli.main import main
 from palpate.devices.usb import DeviceError, install_rule
 
@@ -132,7 +132,7 @@ VERB = re.compile(r"\bpalpate (identify|verify|plan|report|render|simulate|recor
 )
 def test_every_value_in_a_suggested_command_is_one_word_of_a_shell(file: Path) -> None:
     """A value that follows `palpate VERB` in a text is the result of `command_word`."""
-    for text in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for text in nodes_of(file):
         if not isinstance(text, ast.JoinedStr):
             continue
         is_command = False

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from conftest import nodes_of
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, identify, load_model
 from palpate.cli.main import main
@@ -118,7 +119,7 @@ def test_only_constant_text_is_printed_without_being_escaped() -> None:
     for file in CLI.glob("*.py"):
         if file.name == "printing.py":
             continue
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in nodes_of(file):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "click.echo":
                 assert all(isinstance(each, ast.Constant) for each in node.args), (
                     f"{file.name}: {node.lineno}"

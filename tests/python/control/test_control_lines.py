@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,14 @@ def kind(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+@cache
+def plan_on(kind: str) -> Model:
+    return plan(spring(), profile(kind)).stored()
+
+
 @pytest.fixture
 def planned(kind: str, tmp_path: Path) -> Path:
-    return plan(spring(), profile(kind)).stored().save(tmp_path / "planned.json")
+    return plan_on(kind).save(tmp_path / "planned.json")
 
 
 def run_on(kind: str, planned: Path, drive: CanMotor, *options: object) -> Any:

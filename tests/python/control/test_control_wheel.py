@@ -72,9 +72,9 @@ def node(tmp_path: Path) -> Path:
     return tmp_path / "wheel.sock"
 
 
-@pytest.fixture
-def planned(tmp_path: Path) -> Path:
-    return plan(spring(), profile()).stored().save(tmp_path / "planned.json")
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return plan(spring(), profile()).stored().save(tmp_path_factory.mktemp("plan") / "planned.json")
 
 
 @pytest.fixture(scope="module")
