@@ -44,26 +44,26 @@ namespace palpate::bench {
 /// Returns true if a hand can take energy out of one of several objects behind a coupling in the steady state. Each
 /// object responds like a spring whose stiffness is a share of the coupling stiffness, or for a negative share like a
 /// mass.
-[[nodiscard]] inline bool coupling_generates_energy(VirtualCoupling coupling, const DeviceProfile& device) {
+[[nodiscard]] inline bool coupling_generates_energy(VirtualCoupling coupling, const DeviceProfile& device,
+                                                    AnyCase& any) {
     constexpr double reach = 0.01;  // [rad]
+    constexpr std::array slow{1, 2, 3, 4, 6, 10};
+    constexpr std::array shares{1e6, 3.0, 1.0, 0.3, -0.5, -0.8, -1.0, -1.1, -1.2, -1.4, -1.7, -2.0, -4.0};
     const double period = device.period_s;
-    for (const int pace : {1, 2, 3, 4, 6, 10}) {
+    return any(slow.size() * shares.size(), [&](std::size_t k) {
+        const int pace = slow.at(k / shares.size());
+        const double share = shares.at(k % shares.size());
         const auto settled = 400 * static_cast<std::size_t>(pace) * static_cast<std::size_t>(pace);
         const double tangent = std::tan(0.5 * std::numbers::pi / pace);
-        for (const double share :
-             {1e6, 3.0, 1.0, 0.3, -0.5, -0.8, -1.0, -1.1, -1.2, -1.4, -1.7, -2.0, -4.0}) {
-            const double stiffness = std::max(0.0, share) * coupling.stiffness;
-            const double mass =
-                std::max(0.0, -share) * coupling.stiffness * period * period / (4.0 * tangent * tangent);
-            const PacedWork work = work_of_pacing(
-                EnergyConsistent{LinearObject{stiffness}, {mass, 0.0}, coupling, period, 1e-4, false}, device,
-                {reach, pace, 1e6 * device.viscous_damping, period}, 0.0, share < 0.0 ? settled : 400);
-            if (work.negative()) {
-                return true;
-            }
-        }
-    }
-    return false;
+        const double stiffness = std::max(0.0, share) * coupling.stiffness;
+        const double mass =
+            std::max(0.0, -share) * coupling.stiffness * period * period / (4.0 * tangent * tangent);
+        return work_of_pacing(
+                   EnergyConsistent{LinearObject{stiffness}, {mass, 0.0}, coupling, period, 1e-4, false},
+                   device, {reach, pace, 1e6 * device.viscous_damping, period}, 0.0,
+                   share < 0.0 ? settled : 400)
+            .negative();
+    });
 }
 
 /// Ratio of coupling damping to coupling stiffness in the maps [s].
@@ -79,11 +79,12 @@ inline constexpr double coupling_time = 0.2e-3;
 
 /// Failure map: largest coupling stiffness as a function of the device damping.
 [[nodiscard]] inline FailureMap coupling_map(int points) {
-    return {
-        "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
-        lines_over_damping(points, 3.0, coupling_limit, [](const DeviceProfile& device, double stiffness) {
-            return coupling_generates_energy({stiffness, coupling_time * stiffness}, device);
-        })};
+    return {"coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
+            lines_over_damping(points, 3.0, coupling_limit,
+                               [any = AnyCase{}](const DeviceProfile& device, double stiffness) mutable {
+                                   return coupling_generates_energy({stiffness, coupling_time * stiffness},
+                                                                    device, any);
+                               })};
 }
 
 /// Map: steepest falling slope of an object behind a coupling over the coupling stiffness. The device has exactly the
@@ -219,8 +220,8 @@ inline constexpr double coupling_time = 0.2e-3;
     }
     map.lines.push_back(failure_line(
         "coupling, delay 0", periods, [&](double period) { return coupling_limit(device(period, 0)); },
-        [&](double period, double stiffness) {
-            return coupling_generates_energy({stiffness, coupling_time * stiffness}, device(period, 0));
+        [&, any = AnyCase{}](double period, double stiffness) mutable {
+            return coupling_generates_energy({stiffness, coupling_time * stiffness}, device(period, 0), any);
         },
         3.0));
     map.lines.push_back(failure_line(
@@ -250,21 +251,18 @@ inline constexpr double coupling_time = 0.2e-3;
             bounds.slope = {spring, spring};
             return 2.0 * friction / massless_gain(bounds, coupling, smooth_knob().period_s);
         };
-        const auto fails = [&](double spring, double step) {
+        const auto fails = [&, any = AnyCase{}](double spring, double step) mutable {
             DeviceProfile knob = smooth_knob();
             knob.encoder_step = step;
             knob.coulomb_friction = friction;
-            for (const int pace : {1, 2, 4}) {
-                for (const double reach : motions_over_an_edge(knob)) {
-                    const PacedWork work =
-                        work_of_pacing(Massless{LinearObject{spring}, coupling, knob.period_s}, knob,
-                                       {reach, pace, 1e6, knob.period_s}, 0.5 * step - 0.5 * reach, 100);
-                    if (work.negative()) {
-                        return true;
-                    }
-                }
-            }
-            return false;
+            const std::vector<double> motions = motions_over_an_edge(knob);
+            return any(3 * motions.size(), [&](std::size_t k) {
+                const int pace = std::array{1, 2, 4}.at(k / motions.size());
+                const double reach = motions[k % motions.size()];
+                return work_of_pacing(Massless{LinearObject{spring}, coupling, knob.period_s}, knob,
+                                      {reach, pace, 1e6, knob.period_s}, 0.5 * step - 0.5 * reach, 100)
+                    .negative();
+            });
         };
         map.lines.push_back(failure_line("B_c = " + readable(damping), logarithmic(4.0, 4000.0, points),
                                          bound, fails, map.searched));

@@ -71,15 +71,20 @@ struct PacingHand {
     double period_s = 1e-3;  ///< Duration of a tick [s].
     /// Ticks before the first motion of the hand, in which the object is placed at the handle.
     int rests = 1;
-    int turns = 1;  ///< Number of reversals in `ticks` ticks, from 1 to `ticks`.
+    int turns = 1;         ///< Number of reversals in `ticks` ticks, from 1 to `ticks`.
+    double latest = -1.0;  ///< number of the latest tick in which the hand moved, or -1
+    double step = 0.0;     ///< displacement in the latest tick, divided by reach / 2
 
-    [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
+    [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) noexcept {
         const double tick = std::round(time / period_s) - rests;
         if (tick < 0.0) {
             return {0.0, grip_damping, 0.0, 0.0, 0.0};
         }
-        const double angle = std::numbers::pi * turns / ticks;
-        const double step = std::cos(angle * tick) - std::cos(angle * (tick + 1.0));
+        if (tick != latest) {
+            const double angle = std::numbers::pi * turns / ticks;
+            step = std::cos(angle * tick) - std::cos(angle * (tick + 1.0));
+            latest = tick;
+        }
         return {0.0, grip_damping, 0.0, grip_damping * 0.5 * reach * step / period_s, 0.0};
     }
 };

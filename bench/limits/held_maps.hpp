@@ -93,17 +93,14 @@ template <class Limit, class Fails>
             knob.coulomb_friction = friction;
             return knob;
         };
-        const auto fails = [&](double step, double stiffness) {
+        const auto fails = [&, any = AnyCase{}](double step, double stiffness) mutable {
             const DeviceProfile knob = device(step);
-            for (const double reach : motions_over_an_edge(knob)) {
-                const PacedWork work =
-                    work_of_pacing(Direct{LinearObject{stiffness}}, knob, {reach, 1, 1e6, knob.period_s},
-                                   0.5 * step - 0.5 * reach, 100);
-                if (work.negative()) {
-                    return true;
-                }
-            }
-            return false;
+            const std::vector<double> motions = motions_over_an_edge(knob);
+            return any(motions.size(), [&](std::size_t k) {
+                return work_of_pacing(Direct{LinearObject{stiffness}}, knob,
+                                      {motions[k], 1, 1e6, knob.period_s}, 0.5 * step - 0.5 * motions[k], 100)
+                    .negative();
+            });
         };
         map.lines.push_back(failure_line(
             "friction " + readable(friction) + " N*m", logarithmic(2e-6, 2e-2, points),
@@ -124,9 +121,9 @@ template <class Limit, class Fails>
         map.lines.push_back(failure_line(
             "delay " + std::to_string(delay), logarithmic(1e-4, 1e-2, points),
             [&](double radius) { return radius * (direct_limit(device) - spring); },
-            [&](double radius, double hysteresis) {
+            [&, any = AnyCase{}](double radius, double hysteresis) mutable {
                 const ConstantHysteresis object{{spring, 0.0}, {0.0, hysteresis}, radius};
-                return generates_energy([&] { return Direct{object}; }, device, 0.5 * radius);
+                return generates_energy([&] { return Direct{object}; }, device, 0.5 * radius, any);
             }));
     }
     return map;
@@ -157,11 +154,11 @@ template <class Limit, class Fails>
         map.lines.push_back(failure_line(
             "delay " + std::to_string(delay), logarithmic(1e-3, 1.0, points),
             [&](double time_constant_s) { return memory_limit(device, time_constant_s); },
-            [&](double time_constant_s, double stiffness) {
+            [&, any = AnyCase{}](double time_constant_s, double stiffness) mutable {
                 const ForceModel model = relaxing_branch(stiffness, time_constant_s);
                 const MemoryForce<NetworkCurve> object{model.network()->curve(), model.memory()->ratio(),
                                                        *model.memory(), device.period_s};
-                return generates_energy([&] { return Direct{object}; }, device, 0.01);
+                return generates_energy([&] { return Direct{object}; }, device, 0.01, any);
             }));
     }
     return map;
@@ -175,20 +172,17 @@ template <class Limit, class Fails>
 /// Returns true if a firm hand takes energy out in the steady state at one of 60 frequencies up to the Nyquist
 /// frequency.
 [[nodiscard]] inline bool predicted_spring_generates(const DeviceProfile& device, int predict,
-                                                     double stiffness) {
+                                                     double stiffness, AnyCase& any) {
     constexpr int frequencies = 60;
-    for (int turns = 1; turns <= frequencies; ++turns) {
+    return any(frequencies, [&](std::size_t k) {
         const PacingHand hand{.reach = 0.1,
                               .ticks = frequencies,
                               .grip_damping = 1e6 * device.viscous_damping,
                               .period_s = device.period_s,
-                              .turns = turns};
-        if (work_of_pacing(PredictedDirect{LinearObject{stiffness}, predict}, device, hand, 0.0, 0)
-                .negative()) {
-            return true;
-        }
-    }
-    return false;
+                              .turns = static_cast<int>(k) + 1};
+        return work_of_pacing(PredictedDirect{LinearObject{stiffness}, predict}, device, hand, 0.0, 0)
+            .negative();
+    });
 }
 
 /// Failure map: largest stiffness of a spring as a function of the number of past samples of the prediction.
@@ -206,8 +200,8 @@ template <class Limit, class Fails>
         map.lines.push_back(failure_line(
             "delay " + std::to_string(delay), taps,
             [&](double m) { return predicted_limit(device, static_cast<int>(m)); },
-            [&](double m, double stiffness) {
-                return predicted_spring_generates(device, static_cast<int>(m), stiffness);
+            [&, any = AnyCase{}](double m, double stiffness) mutable {
+                return predicted_spring_generates(device, static_cast<int>(m), stiffness, any);
             }));
     }
     return map;

@@ -159,13 +159,36 @@ struct PacedWork {
 /// Ticks between two reversals of each prescribed hand motion; 1 is the Nyquist frequency.
 inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
+/// Tells whether one of several cases fails. The search of a limit asks again and again, so the case that failed last is
+/// tried first.
+class AnyCase {
+  public:
+    /// Returns true if `fails(k)` for one k below `count`, which is the same in each call.
+    template <class Fails>
+    [[nodiscard]] bool operator()(std::size_t count, Fails fails) {
+        if (fails(last_)) {
+            return true;
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+            if (k != last_ && fails(k)) {
+                last_ = k;
+                return true;
+            }
+        }
+        return false;
+    }
+
+  private:
+    std::size_t last_ = 0;
+};
+
 /// Returns true if a hand takes energy out of the rendering in the steady state at a frequency of `paces`.
 template <class Build>
-[[nodiscard]] bool generates_energy(Build build, const DeviceProfile& device, double reach) {
-    return std::any_of(paces.begin(), paces.end(), [&](int pace) {
+[[nodiscard]] bool generates_energy(Build build, const DeviceProfile& device, double reach, AnyCase& any) {
+    return any(paces.size(), [&](std::size_t k) {
         const double grip_damping = 1e6 * (device.viscous_damping + 1e-6);
         const PacedWork work =
-            work_of_pacing(build(), device, {reach, pace, grip_damping, device.period_s}, 0.0);
+            work_of_pacing(build(), device, {reach, paces.at(k), grip_damping, device.period_s}, 0.0);
         return work.negative();
     });
 }

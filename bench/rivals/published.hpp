@@ -60,9 +60,9 @@ struct SpringDamper {
             {limit, source, formula, value, bench::failure_boundary(0.2 * value, 5.0 * value, fails)});
     };
     const auto passive = [](const DeviceProfile& device, double damping) {
-        return [=](double stiffness) {
+        return [=, any = bench::AnyCase{}](double stiffness) mutable {
             return bench::generates_energy([&] { return SpringDamper{stiffness, damping, device.period_s}; },
-                                           device, 0.1);
+                                           device, 0.1, any);
         };
     };
     const std::string_view criterion = "Colgate and Schenkel 1997";
@@ -114,8 +114,9 @@ struct SpringDamper {
         });
     const double coupled = bench::coupling_limit(plain);
     add("coupling, every passive object", "Colgate, Stanley and Brown 1995", "b = K_c T / 2 + B_c", coupled,
-        [&](double stiffness) {
-            return bench::coupling_generates_energy({stiffness, bench::coupling_time * stiffness}, plain);
+        [&, any = bench::AnyCase{}](double stiffness) mutable {
+            return bench::coupling_generates_energy({stiffness, bench::coupling_time * stiffness}, plain,
+                                                    any);
         });
     const double mass = 1e-3;  // [kg*m^2]
     add("explicit step of a mass of 1e-3 kg*m^2", "Hairer, Lubich and Wanner 2006", "K = 4 m / T^2",
@@ -129,21 +130,20 @@ struct SpringDamper {
     }
     const StaticForce cubic{TableCurve{-1.0, 1.0, cubes}};
     add("force of third order, largest slope K", "Mahvash and Hayward 2005", "b = K T / 2", 2.0 * b / T,
-        [&](double slope) {
-            const auto gives = [&](int pace) {
+        [&, any = bench::AnyCase{}](double slope) mutable {
+            return any(bench::paces.size(), [&](std::size_t k) {
                 return bench::work_of_pacing(Direct{StaticForce{cubic.curve.scaled(slope)}}, plain,
-                                             {0.01, pace, 1e6 * b, T}, 0.99)
+                                             {0.01, bench::paces.at(k), 1e6 * b, T}, 0.99)
                     .negative();
-            };
-            return std::any_of(bench::paces.begin(), bench::paces.end(), gives);
+            });
         });
     const double tau = T;  // of a branch, which relaxes within a sample
     add("branch of a standard linear solid, tau = T", criterion, "b = K T / (2 + T / tau), backward Euler",
-        b * (2.0 + T / tau) / T, [&](double stiffness) {
+        b * (2.0 + T / tau) / T, [&, any = bench::AnyCase{}](double stiffness) mutable {
             const ForceModel model = bench::relaxing_branch(stiffness, tau);
             const MemoryForce<NetworkCurve> object{model.network()->curve(), model.memory()->ratio(),
                                                    *model.memory(), T};
-            return bench::generates_energy([&] { return Direct{object}; }, plain, 0.01);
+            return bench::generates_energy([&] { return Direct{object}; }, plain, 0.01, any);
         });
     return all;
 }

@@ -79,19 +79,25 @@ struct SwitchedStep {
     const WaveletNetwork& object;
     double from;
     LoadLine line;
+    double energy = object.at(from, {}).energy;  ///< at `from`
     static constexpr double shortest = 5e-4;
 
-    [[nodiscard]] double quotient(double y) const {
-        return (object.at(y, {}).energy - object.at(from, {}).energy) / (y - from);
+    [[nodiscard]] double quotient(double y, double end) const { return (end - energy) / (y - from); }
+    [[nodiscard]] double by_energy(double y) const {
+        return quotient(y, object.at(y, {}).energy) + line.slope * y - line.intercept;
     }
-    [[nodiscard]] double by_energy(double y) const { return quotient(y) + line.slope * y - line.intercept; }
     [[nodiscard]] double by_force(double y) const {
         return object.at(y, {}).force + line.slope * y - line.intercept;
     }
     [[nodiscard]] bool generates(double y) const {
-        return (object.at(y, {}).force - quotient(y)) * (y - from) < 0.0;
+        const EnvironmentSample end = object.at(y, {});
+        return (end.force - quotient(y, end.energy)) * (y - from) < 0.0;
     }
-    [[nodiscard]] double residual(double y) const { return generates(y) ? by_energy(y) : by_force(y); }
+    [[nodiscard]] double residual(double y) const {
+        const EnvironmentSample end = object.at(y, {});
+        const double mean = quotient(y, end.energy);
+        return ((end.force - mean) * (y - from) < 0.0 ? mean : end.force) + line.slope * y - line.intercept;
+    }
 
     /// Returns the position y nearest to `from` at which `function(y)` is zero, searched towards `to` by short steps
     /// and bisection.
