@@ -19,8 +19,8 @@ import palpate
 from palpate import IdentifyOptions, InputError, Model, Recording, SearchOptions, identify, load_model, verify
 from palpate.cli.identify import identify as identify_verb
 
-X = np.concatenate([np.linspace(0.0, 4.0, 100), np.linspace(4.0, 0.0, 100)])
-DIRECTION = np.repeat([1.0, -1.0], 100)
+X = np.concatenate([np.linspace(0.0, 4.0, 80), np.linspace(4.0, 0.0, 80)])
+DIRECTION = np.repeat([1.0, -1.0], 80)
 
 
 def force(seed: int = 0) -> np.ndarray:

@@ -25,7 +25,7 @@ NUMBERS = {
 
 def switch() -> Curves:
     """Returns a switch of straight lines: peak 0.5 N at 1 mm, contact 0.2 N at 2 mm, stop at 3 mm."""
-    x = np.linspace(0.0, 4e-3, 801)
+    x = np.linspace(0.0, 4e-3, 401)
     press = np.interp(x, [0.0, 1e-3, 2e-3, 3e-3, 4e-3], [0.0, 0.5, 0.2, 0.3, 2.0])
     return Curves(x, press, press - 0.1 * np.minimum(1.0, x / 1e-4))
 

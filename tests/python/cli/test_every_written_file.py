@@ -92,7 +92,7 @@ every_case = cases(SAMPLE)
 every_quick_case = cases(SAMPLE, sorted(CASES.keys() - SLOW))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Programs]:
     with Programs(tmp_path_factory.mktemp("programs")) as started:
         yield started
