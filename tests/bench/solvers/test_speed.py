@@ -66,9 +66,8 @@ def rows_of_both_sizes(name: str, **counters: float) -> list[dict[str, Any]]:
     return rows
 
 
-@pytest.fixture
-def results(tmp_path: Path) -> Path:
-    """Returns a folder of benchmark results, in which one integration method diverges."""
+def write_results(folder: Path) -> Path:
+    """Writes benchmark results, in which one integration method diverges, to a folder and returns it."""
     context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
     benchmarks = {
         "bench_work_precision": [
@@ -95,13 +94,24 @@ def results(tmp_path: Path) -> Path:
         "bench_bounds": [row for name in BOUNDS for row in rows_of_both_sizes(name, excess=0.004)],
     }
     for name, rows in benchmarks.items():
-        (tmp_path / f"{name}.json").write_text(json.dumps({"context": context, "benchmarks": rows}))
-    return tmp_path
+        (folder / f"{name}.json").write_text(json.dumps({"context": context, "benchmarks": rows}))
+    return folder
 
 
-def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results: Path) -> None:
-    to = results / "figures"
-    main([str(results), "--to", str(to)])
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return write_results(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Draws the figures of the results and returns their folder."""
+    folder = write_results(tmp_path_factory.mktemp("results"))
+    main([str(folder), "--to", str(folder / "figures")])
+    return folder / "figures"
+
+
+def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(figures: Path) -> None:
     for name in (
         "work-precision",
         "rendered-force",
@@ -110,8 +120,8 @@ def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results
         "evaluation",
         "bounds",
     ):
-        assert (to / f"{name}.png").read_bytes().startswith(PNG)
-    text = (to / "speed.md").read_text(encoding="utf-8")
+        assert (figures / f"{name}.png").read_bytes().startswith(PNG)
+    text = (figures / "speed.md").read_text(encoding="utf-8")
     assert "| explicit euler | 4 | 20 | 5 | diverges |" in text
     assert "| massless table | 20 | 1 | 0.12 | 0.12 |" in text
     assert "| P1, wavelet network | 6 | 20 | 9 | 0.0003 |" in text
@@ -123,10 +133,8 @@ def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results
     assert "commit abc" in text
 
 
-def test_uses_the_median_of_the_repetitions_and_ignores_the_mean(results: Path) -> None:
-    to = results / "figures"
-    main([str(results), "--to", str(to)])
-    text = (to / "speed.md").read_text(encoding="utf-8")
+def test_uses_the_median_of_the_repetitions_and_ignores_the_mean(figures: Path) -> None:
+    text = (figures / "speed.md").read_text(encoding="utf-8")
     assert "| compiled network | 16 | 2000 |" in text
     assert "| one input | 8 | 2000 | 0.4 |" in text
     assert "11000" not in text

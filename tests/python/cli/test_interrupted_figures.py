@@ -35,9 +35,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     "arguments",
     [
         ["identify", "a.csv", "-o", "new.json", "--plot", "p.png"],
-        ["verify", "m.json", "a.csv", "--plot", "p.png"],
+        pytest.param(["verify", "m.json", "a.csv", "--plot", "p.png"], marks=pytest.mark.full),
         ["verify", "m.json", "a.csv", "--plot", "p.png", "--plot-closed-loop", "loop.png"],
-        ["simulate", "m.json", "-o", "r.csv", "--duration-s", "1", "--plot", "p.png"],
+        pytest.param(
+            ["simulate", "m.json", "-o", "r.csv", "--duration-s", "1", "--plot", "p.png"],
+            marks=pytest.mark.full,
+        ),
         ["plan", "m.json", "--device", "bench-knob", "-o", "new.json", "--plot", "p.png"],
         ["show", "m.json", "--beside", "m.json", "--plot", "p.png"],
         pytest.param(

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import ROOT, nodes_of
+from conftest import ROOT, nodes_of, sampled
 from palpate.cli.main import main
 from palpate.devices.usb import DeviceError, install_rule
 
@@ -67,7 +67,7 @@ def suggested(capsys: pytest.CaptureFixture[str], command: list[str], start: str
     return found[0]
 
 
-@pytest.fixture(params=HOSTILE)
+@pytest.fixture(params=sampled(HOSTILE, "$(touch RUN)", "a'b", "-o", "a b", "~"))
 def name(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)
     return str(request.param)
