@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -17,6 +18,38 @@
 
 namespace palpate {
 
+namespace detail {
+
+/// The explicit structure at one frequency theta, without the slope of the model's force.
+class ExplicitResponse {
+  public:
+    ExplicitResponse(double theta, Inertia inertia, VirtualCoupling coupling, double period_s,
+                     int delay_samples) noexcept {
+        const std::complex<double> z = std::polar(1.0, theta);
+        const std::complex<double> back = std::conj(z);
+        const double drag = period_s * inertia.damping / inertia.mass;
+        free_ = inertia.mass / (period_s * period_s) * (z - (2.0 - drag) + (1.0 - drag) * back);
+        spring_ = coupling.stiffness + coupling.damping / period_s * (1.0 - back);
+        const double sine = std::sin(0.5 * theta);
+        scale_ = period_s / (4.0 * sine * sine);
+        late_ = (1.0 - back) * std::polar(1.0, -delay_samples * theta);
+    }
+
+    /// Returns the device damping that is needed at a slope of the model's force [N*s/m].
+    [[nodiscard]] double need(double slope) const noexcept {
+        const std::complex<double> environment = free_ + slope;
+        return scale_ * (late_ * (spring_ * environment / (spring_ + environment))).real();
+    }
+
+  private:
+    std::complex<double> free_;    ///< E at slope 0
+    std::complex<double> spring_;  ///< C
+    std::complex<double> late_;    ///< (1 - e^{-j theta}) z^{-n_d}
+    double scale_ = 0.0;           ///< T / (2 (1 - cos theta))
+};
+
+}  // namespace detail
+
 /// Returns the device damping that the explicit structure needs to be passive at the frequency theta [N*s/m],
 /// linearised at the slope K of the model's force:
 ///
@@ -27,23 +60,14 @@ namespace palpate {
 [[nodiscard]] inline double explicit_need_at(double theta, double slope, Inertia inertia,
                                              VirtualCoupling coupling, double period_s,
                                              int delay_samples) noexcept {
-    const std::complex<double> z = std::polar(1.0, theta);
-    const std::complex<double> back = std::conj(z);
-    const double drag = period_s * inertia.damping / inertia.mass;
-    const std::complex<double> environment =
-        inertia.mass / (period_s * period_s) * (z - (2.0 - drag) + (1.0 - drag) * back) + slope;
-    const std::complex<double> spring = coupling.stiffness + coupling.damping / period_s * (1.0 - back);
-    const std::complex<double> series = spring * environment / (spring + environment);
-    const double sine = std::sin(0.5 * theta);
-    return period_s / (4.0 * sine * sine) *
-           ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * series).real();
+    return detail::ExplicitResponse{theta, inertia, coupling, period_s, delay_samples}.need(slope);
 }
 
 /// Returns the largest device damping that the linearised explicit structure needs over all frequencies and all slopes
 /// in `slopes` [N*s/m]. It is the largest of many samples, refined by smaller steps around the largest sample of each
 /// slope and around the largest of all, so the error of the result has no proved bound.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
-                                          double period_s, int delay_samples) noexcept {
+                                          double period_s, int delay_samples) {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
     // Number of refinements around the largest needed damping; each one halves the distance between the tried
@@ -53,17 +77,21 @@ namespace palpate {
     constexpr int repeats = 4;
     constexpr double lowest = 1e-4;  // lowest tried frequency, as angular frequency times the period T [rad]
     const double log_range = std::log(std::numbers::pi / lowest);
-    const auto need = [&](double along, double slope) noexcept {
-        return explicit_need_at(lowest * std::exp(log_range * along), slope, inertia, coupling, period_s,
-                                delay_samples);
+    const auto response = [&](double along) noexcept {
+        return detail::ExplicitResponse{lowest * std::exp(log_range * along), inertia, coupling, period_s,
+                                        delay_samples};
     };
+    std::vector<detail::ExplicitResponse> responses;
+    responses.reserve(frequencies + 1);
+    for (int k = 0; k <= frequencies; ++k) {
+        responses.push_back(response(static_cast<double>(k) / frequencies));
+    }
     double best = -std::numeric_limits<double>::infinity();
     double best_along = 0.0;
     double best_slope = slopes.lower;
-    const auto try_sample = [&](double along, double slope) noexcept {
-        along = std::clamp(along, 0.0, 1.0);
-        slope = std::clamp(slope, slopes.lower, slopes.upper);
-        const double value = need(along, slope);
+    const auto try_response = [&](double along, double slope,
+                                  const detail::ExplicitResponse& at_frequency) noexcept {
+        const double value = at_frequency.need(slope);
         if (value > best) {
             best = value;
             best_along = along;
@@ -71,27 +99,32 @@ namespace palpate {
         }
         return value;
     };
+    const auto try_sample = [&](double along, double slope) noexcept {
+        along = std::clamp(along, 0.0, 1.0);
+        return try_response(along, std::clamp(slope, slopes.lower, slopes.upper), response(along));
+    };
     const double across = slopes.upper - slopes.lower;
     for (int i = 0; i <= slope_steps; ++i) {
         // The largest need at this slope is refined first, because a narrow maximum between two frequencies can be the
         // largest of all
-        const double slope = slopes.lower + across * i / slope_steps;
+        const double slope = std::min(slopes.lower + across * i / slope_steps, slopes.upper);
         double largest = -std::numeric_limits<double>::infinity();
         double at = 0.0;
-        const auto try_frequency = [&](double along) noexcept {
-            if (const double value = try_sample(along, slope); value > largest) {
+        const auto keep = [&](double along, double value) noexcept {
+            if (value > largest) {
                 largest = value;
                 at = along;
             }
         };
-        for (int k = 0; k <= frequencies; ++k) {
-            try_frequency(static_cast<double>(k) / frequencies);
+        for (std::size_t k = 0; k < responses.size(); ++k) {
+            const double along = static_cast<double>(k) / frequencies;
+            keep(along, try_response(along, slope, responses[k]));
         }
         for (int halving = 0; halving < halvings; ++halving) {
             const double step = std::ldexp(1.0, -1 - halving) / frequencies;
             const double middle = at;
-            try_frequency(middle - step);
-            try_frequency(middle + step);
+            keep(middle - step, try_sample(middle - step, slope));
+            keep(middle + step, try_sample(middle + step, slope));
         }
     }
     for (int step = 0; step < repeats * halvings; ++step) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -63,12 +64,32 @@ namespace detail {
     return most;
 }
 
-/// Returns the conjugate of the frequency response Q = sum of taps[j - 1] z^-j of a filter at z = exp(i theta).
-/// Computes the cosine and the sine of j theta by a recurrence.
-[[nodiscard]] inline std::complex<double> response(std::span<const double> taps, double theta) noexcept {
-    const double twice = 2.0 * std::cos(theta);
+/// Calls use(z) for z = exp(i pi k / last), k from 0 to `last`. A block of numbers is one block turned, because a
+/// product costs less than a sine and a cosine.
+template <class Use>
+void along_half_circle(std::size_t last, Use use) {
+    const auto at = [&](std::size_t k) {
+        return std::polar(1.0, std::numbers::pi * static_cast<double>(k) / static_cast<double>(last));
+    };
+    std::array<std::complex<double>, 64> block;
+    for (std::size_t k = 0; k < std::min(block.size(), last + 1); ++k) {
+        block[k] = at(k);
+    }
+    std::complex<double> turn;
+    for (std::size_t k = 0; k <= last; ++k) {
+        const std::size_t within = k % block.size();
+        turn = within == 0 ? at(k) : turn;
+        use(turn * block[within]);
+    }
+}
+
+/// Returns the conjugate of the frequency response Q = sum of taps[j - 1] z^-j of a filter at a number z of size 1.
+/// Computes the powers of z by a recurrence.
+[[nodiscard]] inline std::complex<double> response(std::span<const double> taps,
+                                                   std::complex<double> z) noexcept {
+    const double twice = 2.0 * z.real();
     std::complex<double> before = 1.0;
-    std::complex<double> now{0.5 * twice, std::sin(theta)};
+    std::complex<double> now = z;
     std::complex<double> sum;
     for (const double tap : taps) {
         sum += tap * now;
@@ -125,12 +146,11 @@ class FilterGain {
     FilterGain(std::span<const double> taps, Maximum kind, int resolution)
         : kind_{kind}, resolution_{resolution}, size_{size_of(taps)} {
         const auto last = static_cast<std::size_t>(resolution) * std::max<std::size_t>(1, taps.size());
-        for (std::size_t k = 0; k <= last; ++k) {
-            const std::complex<double> Q =
-                response(taps, std::numbers::pi * static_cast<double>(k) / static_cast<double>(last));
+        along_half_circle(last, [&](std::complex<double> z) {
+            const std::complex<double> Q = response(taps, z);
             real_.push_back(Q.real());
             square_.push_back(std::norm(Q));
-        }
+        });
     }
 
     /// Returns the sum of the absolute filter coefficients, an upper bound of the frequency response |Q|.
@@ -274,11 +294,10 @@ class SplitGain {
     SplitGain(std::span<const double> taps, Maximum kind, int resolution)
         : kind_{kind}, resolution_{resolution}, size_{1.0 + size_of(taps)} {
         const std::size_t last = static_cast<std::size_t>(resolution) * (taps.size() + 1);
-        for (std::size_t k = 0; k <= last; ++k) {
-            const double theta = std::numbers::pi * static_cast<double>(k) / static_cast<double>(last);
-            now_.push_back(response(taps, theta));
-            before_.push_back((1.0 + now_.back()) * std::polar(1.0, theta));
-        }
+        along_half_circle(last, [&](std::complex<double> z) {
+            now_.push_back(response(taps, z));
+            before_.push_back((1.0 + now_.back()) * z);
+        });
     }
 
     [[nodiscard]] double size() const noexcept { return size_; }
