@@ -222,7 +222,7 @@ TEST(UsbEnding, TheStatementAboutZeroForceIsTrueForEveryEndingAndConnection) {
     for (const std::vector<std::string>& connection : connections) {
         for (const bool refuses : {false, true}) {
             for (const Ending ending : {Ending::TimeUp, Ending::Stop, Ending::Guard, Ending::LateTick}) {
-                if (!test::is_sampled(combinations++, 3)) {
+                if (!test::is_sampled(combinations++, 7)) {
                     continue;
                 }
                 std::vector<std::string> orders;
