@@ -65,6 +65,12 @@ def test_a_force_clipped_at_its_lower_end_is_reported() -> None:
     assert "the least force, -5 N*m, occurs in" in only_sentence(both)
 
 
+def test_a_force_clipped_near_zero_is_reported() -> None:
+    rows = rows_of("P1")
+    pulled = replace(rows, f=np.minimum(rows.f - 10.0, -1.0))
+    assert "the largest force, -1 N*m, occurs in" in only_sentence(pulled)
+
+
 def test_a_coarse_force_with_a_flat_maximum_is_not_clipped() -> None:
     x = np.linspace(0.0, 1e-2, 2000)
     f = np.round(50.0 * (1.0 - (x / 1e-2 - 0.5) ** 2) / 0.1) * 0.1

@@ -23,7 +23,8 @@ def clipped_force(
     near_share : float
         Share of the range of the force within which values are near [-].
     contact_share : float
-        A force below this share of the largest |force| is that without contact [-].
+        A force below this share of the largest |force| is that without contact [-], if it occurs at the
+        smallest position.
     """
     x, f = checked.recording.position, checked.recording.force
     if not np.ptp(f) > 0.0:
@@ -32,7 +33,7 @@ def clipped_force(
     found = []
     for value, name in ((float(f.max()), "largest"), (float(f.min()), "least")):
         at = np.flatnonzero(f == value)
-        if abs(value) < contact_share * float(np.abs(f).max()):
+        if abs(value) < contact_share * float(np.abs(f).max()) and x[at].min() == x.min():
             continue
         near = f[(np.abs(f - value) <= near_share * float(np.ptp(f))) & (f != value)]
         most_near = np.unique(near, return_counts=True)[1].max(initial=1)
