@@ -96,17 +96,24 @@ enum class Regime { Usual, Firm, Limited };
     return scheme;
 }
 
+/// Number of motions that a trial optimises.
+[[nodiscard]] inline int tried_motions() {
+    return test::cases(1) > 1 ? 6 : 4;
+}
+/// Number of changes of each motion.
+inline constexpr int changes = 60;
+
 /// Returns a trial that optimises one motion. The trial then compares the device damping with the least damping at
 /// which the motion takes no energy out.
 [[nodiscard]] inline Trial motion_trial(test::Random& random, AnyStructure structure,
-                                        const CoupledScene& scene, const Need& need, int starts, int steps) {
+                                        const CoupledScene& scene, const Need& need) {
     const double period = scene.device.longest_period_s();
     auto shared = std::make_shared<AnyStructure>(std::move(structure));
     const auto seed = random();
-    const auto worst = [shared, scene, starts, steps, seed](const auto& rate, const auto& gain) {
+    const auto worst = [shared, scene, seed](const auto& rate, const auto& gain) {
         test::Random own{seed};
         MotionSearch search{*shared, scene.places, scene.device.force_limit};
-        return search.most(own, starts, steps, rate, gain);
+        return search.most(own, tried_motions(), changes, rate, gain);
     };
     struct Known {
         double friction = -1.0;
@@ -133,8 +140,7 @@ enum class Regime { Usual, Firm, Limited };
 /// Returns a trial that optimises one motion and compares the friction of the device with the least friction at which
 /// the motion takes no energy out.
 [[nodiscard]] inline Trial friction_trial(test::Random& random, AnyStructure structure,
-                                          const CoupledScene& scene, const Need& need, int starts,
-                                          int steps) {
+                                          const CoupledScene& scene, const Need& need) {
     const double period = scene.device.longest_period_s();
     auto shared = std::make_shared<AnyStructure>(std::move(structure));
     struct Known {
@@ -151,7 +157,7 @@ enum class Regime { Usual, Firm, Limited };
                         return account.gain(damping, scene.places.held, 0.0);
                     };
                     known->damping = damping;
-                    known->friction = search.most(own, starts, steps, rate, rate);
+                    known->friction = search.most(own, tried_motions(), changes, rate, rate);
                 }
                 return known->friction > friction_factor * need.friction;
             },
@@ -201,8 +207,6 @@ enum class Regime { Usual, Firm, Limited };
             scene.places.widest = 40.0 * scene.device.force_limit / scene.scheme.coupling.stiffness;
         }
     };
-    constexpr int starts = 6;
-    constexpr int steps = 60;
     if (network) {
         const ForceModel model = hysteresis ? small_hysteresis(random, test::uniform(random, 0.005, 0.05))
                                             : ForceModel{small_network(random), test::unit_domain()};
@@ -218,7 +222,7 @@ enum class Regime { Usual, Firm, Limited };
         placed(0.0, 1.0, model.finest_width(), slope, [&](double x) { return curve.at(x).value; });
         return motion_trial(
             random, make_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit),
-            scene, *need, starts, steps);
+            scene, *need);
     }
     const int count = 12;
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -242,7 +246,7 @@ enum class Regime { Usual, Firm, Limited };
             return std::nullopt;
         }
         const auto run = [&](AnyStructure structure) -> std::optional<Trial> {
-            return motion_trial(random, std::move(structure), scene, *need, starts, steps);
+            return motion_trial(random, std::move(structure), scene, *need);
         };
         const double limit = scene.device.force_limit;
         switch (kind) {
@@ -307,15 +311,12 @@ enum class Regime { Usual, Firm, Limited };
     if (!need || need->damping <= 0.0 || need->friction <= 0.0) {
         return std::nullopt;
     }
-    constexpr int starts = 6;
-    constexpr int steps = 60;
     if (mass) {
         return friction_trial(
             random, Implicit{test::Spring{slope}, scene.scheme.inertia, scene.scheme.coupling, period}, scene,
-            *need, starts, steps);
+            *need);
     }
-    return friction_trial(random, Massless{PieceObject{g}, scene.scheme.coupling, period}, scene, *need,
-                          starts, steps);
+    return friction_trial(random, Massless{PieceObject{g}, scene.scheme.coupling, period}, scene, *need);
 }
 
 /// Makes a force with hysteresis that is computed at a predicted position. The play operator follows the measured
@@ -346,9 +347,7 @@ enum class Regime { Usual, Firm, Limited };
     scene.places.high = step * count;
     scene.places.finest = 1e-2 * step;
     scene.places.widest = 3.0 * step * count;
-    constexpr int starts = 6;
-    constexpr int steps = 60;
-    return motion_trial(random, PredictedDirect{pair, scene.scheme.predict}, scene, *need, starts, steps);
+    return motion_trial(random, PredictedDirect{pair, scene.scheme.predict}, scene, *need);
 }
 
 }  // namespace palpate::energy_search

@@ -50,12 +50,11 @@ class Pieces {
             return {force, 0.0, integral + force * (u - edge) * step_, 0.0};
         }
         const auto cell = std::min(static_cast<std::size_t>(u), cells() - 1);
-        const double rise = force_[cell + 1] - force_[cell];
+        const double force = force_[cell];
+        const double rise = force_[cell + 1] - force;
         const double part = u - static_cast<double>(cell);
-        return {
-            force_[cell] + part * rise, rise / step_,
-            turns * integral_.back() + integral_[cell] + step_ * part * (force_[cell] + 0.5 * part * rise),
-            0.0};
+        return {force + part * rise, rise / step_,
+                turns * integral_.back() + integral_[cell] + step_ * part * (force + 0.5 * part * rise), 0.0};
     }
     [[nodiscard]] bool extrapolated(double /*x*/) const noexcept { return false; }
 

@@ -65,12 +65,10 @@ namespace palpate::energy_search {
                     .encoder_step = count,
                     .delay = scene.device.whole_delay_samples(),
                     .late = scene.device.delay_fraction()};
-    constexpr int starts = 6;
-    constexpr int steps = 60;
     AnyStructure structure =
         make_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit);
-    return encoder ? friction_trial(random, std::move(structure), scene, *need, starts, steps)
-                   : motion_trial(random, std::move(structure), scene, *need, starts, steps);
+    return encoder ? friction_trial(random, std::move(structure), scene, *need)
+                   : motion_trial(random, std::move(structure), scene, *need);
 }
 
 }  // namespace palpate::energy_search
