@@ -89,7 +89,7 @@ def bump(alpha: float, weight: float) -> Model:
 @pytest.mark.parametrize(
     "model", [bump(20.0, 0.5), bump(20.0, -0.5), bump(40.0, -0.2)], ids=["rises", "falls", "falls-narrow"]
 )
-@pytest.mark.parametrize("delay", [0.25, 1.0, 2.0])
+@pytest.mark.parametrize("delay", sampled([0.25, 1.0, 2.0], 1.0))
 def test_with_delay_the_force_error_is_not_larger_than_with_equal_slopes(model: Model, delay: float) -> None:
     device = DeviceProfile(
         id="late", viscous_damping=0.01, coulomb_friction=0.01, encoder_step=1e-4, delay_s=delay * 1e-3
@@ -138,7 +138,7 @@ def random_slopes(seed: int, **changes: Any) -> Model:
     )
 
 
-@pytest.mark.parametrize("seed", sampled(range(25), *range(6)))
+@pytest.mark.parametrize("seed", sampled(range(25), *range(3)))
 def test_a_required_coupling_is_planned_at_its_bound_and_one_ulp_below(seed: int) -> None:
     strong = DeviceProfile(id="strong", viscous_damping=2.0, coulomb_friction=0.5)
     # The force of every second model pushes out of the domain, so that its continuation is the steepest part
