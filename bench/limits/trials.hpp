@@ -159,7 +159,7 @@ struct PacedWork {
 /// Ticks between two reversals of each prescribed hand motion; 1 is the Nyquist frequency.
 inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
-/// Tells whether one of several cases fails. The search of a limit asks again and again, so the case that failed last is
+/// States if one of several cases fails. The search of a limit calls it again and again, so the case that failed last is
 /// tried first.
 class AnyCase {
   public:
