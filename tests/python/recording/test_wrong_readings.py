@@ -318,5 +318,5 @@ def test_the_first_and_the_last_rows_are_not_judged_by_rows_on_one_side(row: int
     assert wrong_rows(PRESS, changed(FORCE, {at: float(FORCE[at]) + 20.0 * np.ptp(FORCE)})) == [at]
 
 
-def test_a_first_reading_that_is_not_judged_hardly_changes_the_curve() -> None:
+def test_a_first_reading_that_is_not_judged_changes_the_curve_little() -> None:
     assert difference_from_clean(palpate.identify(recorded(PRESS, changed(FORCE, {0: 30.0})))) < 0.1
