@@ -7,6 +7,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +21,7 @@ from .columns import Choice, Column, choose_columns
 from .contact import air_rows
 from .files import Layout, sha256_of_file
 from .looks import clock_seconds
+from .motion import waits
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import CLOCK, COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
@@ -87,6 +89,13 @@ class Motion:
     """(m,) [s]"""
     rows: NDArray[np.intp]
     """(n,) indices, in `position`, of the rows that the recording contains"""
+
+    @cached_property
+    def waiting(self) -> NDArray[np.bool_] | None:
+        """True (n,) for rows of the recording at which the tool waits; None if all rows have no order of a
+        motion"""
+        found = waits(self.position, self.time)
+        return None if found is None else found[self.rows]
 
 
 @dataclass(frozen=True)
@@ -351,9 +360,10 @@ def converted(
             )
         f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
         names["force"] = _torque_text(choice.force.name, torque_constant)
+    time = None if choice.time is None else conversion.si(choice.time, cells)
     if zero is not None:
         if zero == "air":
-            without_contact, where = air_rows(x, f), "the rows before the contact"
+            without_contact, where = air_rows(x, f, waits(x, time)), "the rows before the contact"
             if not without_contact.any():
                 raise InputError(
                     f"{name}: --zero air finds no rows before the contact; name them: START:STOP"
@@ -368,7 +378,6 @@ def converted(
         f = f - offset
         notes.append(f"{offset:.6g} {units['force']}, the mean force of {where}, is subtracted")
     _require_enough(name, choice.position, x, check.notes)
-    time = None if choice.time is None else conversion.si(choice.time, cells)
     inputs = [conversion.si(column, cells) for column in choice.inputs]
     used = {*conversion.numbers, conversion.direction}
     is_part = (start, stop) != (0, total) or unwanted.any()

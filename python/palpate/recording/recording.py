@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -237,7 +238,7 @@ class Recording:
         (kept,) = Informative([self]).recordings
         return Verdict(tuple(quality_findings(kept)))
 
-    @property
+    @cached_property
     def motion(self) -> Motion:
         """Positions and times of all rows of the motion, including the rows that were held out."""
         if self.part_of is not None and len(self.part_of.rows) == len(self):

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Int8Vector
 from .checks.wrong_readings import repeated_rows, wrong_readings
 from .contact import contact_at
-from .motion import waits
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -66,8 +65,8 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     rows.
     """
     role = np.where(repeated_rows(recording), Role.REPEATED, Role.MOVING).astype(np.int8)
-    of_motion = None if recording.input_names else waits(recording.motion.position, recording.motion.time)
-    if of_motion is None or (waiting := of_motion[recording.motion.rows]).all():
+    waiting = None if recording.input_names else recording.motion.waiting
+    if waiting is None or waiting.all():
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])

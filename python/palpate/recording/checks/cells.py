@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..._core.model import play
 from ..._typing import Float1D
-from ..motion import waits
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -64,7 +63,7 @@ class Checked:
         few rows belong to a stroke."""
         if self.recording.input_names:
             return None
-        waiting = waits(self.recording.position, self.recording.time)
+        waiting = self.recording.motion.waiting
         if waiting is None:
             return cell_rows(self.recording)
         moving = np.flatnonzero(~waiting)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...verdict import Finding, no, usable
-from ..motion import waits
 from ..units import GRAVITY
 from .cells import sides
 
@@ -96,10 +95,8 @@ class _Strokes:
 
 def _moving(recording: Recording) -> NDArray[np.bool_]:
     """Returns True for the rows at which the tool moves: in a wait the force relaxes."""
-    waiting = waits(recording.motion.position, recording.motion.time)
-    if waiting is None or (here := waiting[recording.motion.rows]).all():
-        return np.ones(len(recording), dtype=bool)
-    return np.asarray(~here)
+    waiting = recording.motion.waiting
+    return np.ones(len(recording), dtype=bool) if waiting is None or waiting.all() else ~waiting
 
 
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
