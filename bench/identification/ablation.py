@@ -227,7 +227,7 @@ CHECKS = "recording.checks"
 DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "classes", "search"))
 
 RULES = (
-    Rule("rows that wait are not fitted", "recording.roles", "waits", _no_waits),
+    Rule("rows that wait are not fitted", "recording.conversion", "waits", _no_waits),
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
     Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
@@ -243,7 +243,7 @@ RULES = (
     ),
     Rule("rows of a slower sensor", f"{CHECKS}.wrong_readings", "_rows_held", _one),
     Rule("residuals show wrong readings", "identification.identify", "Informative", OfForces),
-    Rule("waits are judged by time", "recording.roles", "waits", lambda x, time=None: waits(x)),
+    Rule("waits are judged by time", "recording.conversion", "waits", lambda x, time=None: waits(x)),
     Rule("play follows over a gap", f"{DATA}.rows", "ordered_strokes", _nothing),
     Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
@@ -434,7 +434,8 @@ def result_of(fit: Fit, *changes: AbstractContextManager[None]) -> dict[str, Any
         with ExitStack() as stack:
             for change in changes:
                 stack.enter_context(change)
-            model = palpate.identify(list(fit.recordings), **fit.options)
+            recordings = [replace(each) for each in fit.recordings]  # without the waits found before
+            model = palpate.identify(recordings, **fit.options)
     except InputError as error:
         return {"verdict": "refused", "refused": str(error)}
     return {
