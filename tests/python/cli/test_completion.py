@@ -63,7 +63,7 @@ CASES = [
     (["identify", "a.csv", "--plot", ""], ["p.png"]),
     (["verify", "m.json", "a.c"], ["a.csv"]),
     (["plan", "m.json", "--device", "bench"], ["bench-knob"]),
-    (["plan", "m.json", "--device", "d"], ["d.toml"]),
+    (["plan", "m.json", "--device", "d."], ["d.toml"]),
     (["plan", "--examples", "--dev"], ["--device"]),
     (["render", "m.json", "--device", "m"], ["mit", "moteus"]),
     (["app", ""], ["a.csv", "a.parquet"]),

@@ -197,7 +197,6 @@ def test_wavelets_use_only_the_inputs_that_they_need() -> None:
 def test_growth_on_parts_of_many_rows_costs_less_at_the_same_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts the rows of all refinement steps: they take most of the time."""
     step, problem = SeparableProblem.normal_equations, over_four_inputs(20_000, 0.05)
-    monkeypatch.setattr(growth, "MOST_LIBRARY_ROWS", 1000)
     rows, errors = [0, 0], []
     for case, least in enumerate((1000, 20_000)):
 
