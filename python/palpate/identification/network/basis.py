@@ -184,7 +184,7 @@ class _Neighbours:
         self._sorted = distinct[:, 0] if d == 1 else None
         self._tree = scipy.spatial.cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
         self._size = len(distinct)
-        self._radii: dict[int, tuple[Float1D, Float1D]] = {}
+        self._middles: dict[int, Float1D] = {}
 
     def reach(self, places: Float2D, count: int) -> Float1D:
         """Returns the radius (N,) around each place (N, d) that contains `count` positions; infinite if there
@@ -198,31 +198,15 @@ class _Neighbours:
         if self._sorted is None:
             square = scipy.spatial.distance.cdist(places, self._positions, "sqeuclidean")
             return np.asarray(np.sqrt(np.partition(square, count - 1, axis=1)[:, count - 1]))
-        if count not in self._radii:
-            self._radii[count] = _radii_on_a_line(self._sorted, count)
-        return np.interp(places[:, 0], *self._radii[count])
-
-
-FURTHEST_PLACE = 10.0
-"""Largest distance of a place from the positions [range of recorded positions]"""
-
-
-def _radii_on_a_line(positions: Float1D, count: int) -> tuple[Float1D, Float1D]:
-    """Returns places (k,) and the radius (k,) around each that contains `count` of the sorted positions.
-
-    Between these places the radius is linear: it is least in the middle of `count` neighbours, and largest
-    halfway between the first and the last of one more.
-    """
-    few, more = len(positions) - count + 1, len(positions) - count
-    places, radii = np.empty((2, few + more))
-    for part, size, last in ((slice(0, None, 2), few, count - 1), (slice(1, None, 2), more, count)):
-        left, right = positions[:size], positions[last:]
-        places[part], radii[part] = 0.5 * (left + right), 0.5 * (right - left)
-    beyond = FURTHEST_PLACE * np.array([-1.0, 1.0])
-    return (
-        np.concatenate([places[:1] + beyond[0], places, places[-1:] + beyond[1]]),
-        np.concatenate([radii[:1] - beyond[0], radii, radii[-1:] + beyond[1]]),
-    )
+        # On a line the nearest positions are neighbours in order, with their middle next to the place.
+        if count not in self._middles:
+            first, last = self._sorted[: self._size - count + 1], self._sorted[count - 1 :]
+            self._middles[count] = 0.5 * (first + last)
+        place = places[:, 0]
+        above = np.searchsorted(self._middles[count], place)
+        first = np.array([np.maximum(above - 1, 0), np.minimum(above, self._size - count)])
+        left, right = self._sorted[first], self._sorted[first + (count - 1)]
+        return np.asarray(np.maximum(place - left, right - place).min(axis=0))
 
 
 COARSEST_CANDIDATE = 1.0
