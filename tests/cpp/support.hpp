@@ -28,6 +28,12 @@ inline int cases(int quick) {
     return quick * std::max(1, scale == nullptr ? 1 : std::atoi(scale));
 }
 
+/// Returns the number of random test cases: `quick` in the normal test run, PALPATE_TEST_SCALE times `each` in the full
+/// test run.
+inline int cases(int quick, int each) {
+    return cases(1) > 1 ? cases(each) : quick;
+}
+
 /// Returns true if the normal test run includes the combination of this number: one of `every`. The full test run
 /// includes all. If `every` has no common divisor with the number of values of a parameter, each value is included.
 inline bool is_sampled(int number, int every) {

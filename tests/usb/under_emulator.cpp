@@ -70,7 +70,7 @@ int main(int count, char** words) {
                                   {"UsbDelay", {}},
                                   {"UsbEnding", {}},
                                   {"UsbText", {"--no-device"}}};
-    for (int seed = 1; seed <= palpate::test::cases(5); ++seed) {
+    for (int seed = 1; seed <= palpate::test::cases(5, 10); ++seed) {
         machines.push_back({"UsbOtherFirmware", {"--seed", std::to_string(seed)}});
     }
     int worst = 0;

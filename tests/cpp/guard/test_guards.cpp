@@ -438,7 +438,7 @@ double knob_energy(double x) {
 }
 
 TEST(GuardedAccount, SlowPressesOfTheReadmeKnobAreNeverLimitedNorGiveEnergy) {
-    const Pressed run = press_readme_knob(test::cases(500));
+    const Pressed run = press_readme_knob(test::cases(500, 2000));
     EXPECT_EQ(run.energy_limited, 0U) << "of " << run.ticks << " ticks";
     EXPECT_EQ(run.limit_cycle_scaled, 0U);
     const double held = knob_energy(0.2) - energy_range(readme_knob()).least;
