@@ -320,9 +320,8 @@ def fit_environment(
 def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     """Identifies a force law from rows, as :func:`fit_environment` does from arrays."""
     require_usable(rows, options)
-    if scale := ForceScale.of(rows.force, options):
-        return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
-    return _fitted(rows, options)
+    scale = ForceScale.of(rows.force, options)
+    return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
 
 
 def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:

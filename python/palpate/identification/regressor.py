@@ -227,9 +227,8 @@ def fit_regression(
             f"the largest absolute value is {largest:.3g}: must be at most {LARGEST_MAGNITUDE:g}. Use other "
             "units"
         )
-    if scale := ForceScale.of(y, options):
-        columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
-        return columns, scaled.unscaled(scale)
+    scale = ForceScale.of(y, options)
+    y, options = scale.scaled(y), scale.scaled_options(options)
     varies = np.ptp(X, axis=0) > LEAST_RELATIVE_RANGE * np.abs(X).max(axis=0)
     # a network needs an input: if no column of X varies, the first column is the input, in a box as wide as
     # its value, at least 1
@@ -251,7 +250,7 @@ def fit_regression(
     margin = _margin(rows.box) * (upper - lower)
     log = Log(selection.log.path)
     network = replace(best.network, rmse=error.rmse, log=log, lower=lower - margin, upper=upper + margin)
-    return columns, network
+    return columns, network.unscaled(scale)
 
 
 def _margin(box: Float2D) -> float:

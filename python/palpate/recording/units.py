@@ -24,14 +24,17 @@ class Unit:
     for a unit of another quantity, such as kPa or mm/s."""
     factor: float
     """Factor of the conversion: value in SI = factor * value in this unit"""
+    scale: float = 1.0
+    """Value given to :meth:`text` = scale * value in SI; 1 except for the scaled forces of a fit"""
 
     def text(self, value: float) -> str:
-        """Returns a value given in SI as text in this unit, with four significant digits and the symbol."""
-        return f"{value / self.factor:.4g} {self.shown}".rstrip()
+        """Returns a value given in SI, times the scale, as text in this unit, with four significant digits
+        and the symbol."""
+        return f"{value / (self.factor * self.scale):.4g} {self.shown}".rstrip()
 
     def interval(self, low: float, high: float) -> str:
-        """Returns the interval of two values given in SI as text in this unit: "0.1 to 0.3 mm"."""
-        return f"{low / self.factor:.4g} to {self.text(high)}"
+        """Returns the interval of two values, as :meth:`text` takes them, as text: "0.1 to 0.3 mm"."""
+        return f"{low / (self.factor * self.scale):.4g} to {self.text(high)}"
 
     @property
     def shown(self) -> str:

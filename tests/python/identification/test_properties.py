@@ -27,8 +27,12 @@ NOISE = 0.005
 DECADES = 12
 """The units of position and of force vary over this number of decades"""
 
+ROUNDING = 1e-12
+"""Largest accepted change of the force by other units or another zero of position, divided by its range"""
+
 RECOVERED = 1e-4
-"""Largest accepted change of the force divided by its range; a play radius is found to a tolerance"""
+"""Largest accepted change of the force by another unit of time, divided by its range; a relaxation time is
+found to a tolerance"""
 
 
 def device(position: float = 1.0, force: float = 1.0) -> DeviceProfile:
@@ -115,7 +119,7 @@ def units(draws: int, seed: int) -> list[tuple[float, float]]:
     return [(1.0 / end, end), (end, 1.0 / end), *((float(x), float(f)) for x, f in drawn)]
 
 
-def assert_equal(kind: str, model: Model, force: Array, within: float = RECOVERED) -> None:
+def assert_equal(kind: str, model: Model, force: Array, within: float = ROUNDING) -> None:
     """`force` is that of the model, in the units of the reference."""
     old = forces(reference(kind))
     assert model.kind == kind
@@ -130,20 +134,13 @@ def test_a_change_of_units_changes_the_units_of_the_model_only(kind: str) -> Non
         assert_equal(kind, model, forces(model, position=x) / f)
 
 
-@pytest.mark.parametrize("kind", sampled(KINDS, "position"))
-def test_units_of_powers_of_two_give_the_same_model_bit_by_bit(kind: str) -> None:
-    x, f = 2.0**20, 2.0**-20
-    model = identified(changed(recorded(kind), position=x, force=f), kind)
-    assert np.array_equal(forces(model, position=x) / f, forces(reference(kind)))
-
-
 @pytest.mark.parametrize("kind", sampled(["position_velocity", "memory"], "position_velocity"))
 @pytest.mark.parametrize("factor", sampled([1e-3, 1e3], 1e3))
 def test_a_change_of_the_unit_of_time_changes_velocities_and_relaxation_times_only(
     kind: str, factor: float
 ) -> None:
     model = identified(changed(recorded(kind), time=factor), kind)
-    assert_equal(kind, model, forces(model, time=factor))
+    assert_equal(kind, model, forces(model, time=factor), RECOVERED)
     if kind == "memory":
         old, new = reference(kind).memory, model.memory
         assert old is not None
@@ -152,10 +149,14 @@ def test_a_change_of_the_unit_of_time_changes_velocities_and_relaxation_times_on
 
 
 @pytest.mark.parametrize("kind", sampled(KINDS, "position"))
-@pytest.mark.parametrize(("position_zero", "force_zero"), [(1e3, 0.0), (0.0, -1e3)])
-def test_another_zero_moves_the_model_only(kind: str, position_zero: float, force_zero: float) -> None:
+@pytest.mark.parametrize(
+    ("position_zero", "force_zero", "within"), [(1e3, 0.0, ROUNDING), (0.0, -1e3, NOISE)]
+)
+def test_another_zero_moves_the_model_only(
+    kind: str, position_zero: float, force_zero: float, within: float
+) -> None:
     model = identified(changed(recorded(kind), position_zero=position_zero, force_zero=force_zero), kind)
-    assert_equal(kind, model, forces(model, position_zero=position_zero) - force_zero, NOISE)
+    assert_equal(kind, model, forces(model, position_zero=position_zero) - force_zero, within)
 
 
 @pytest.mark.parametrize("kind", sampled(KINDS, "position"))

@@ -210,7 +210,8 @@ class Dynamics:
             names = tuple(other for other in names if other != name)
             reason = f"{measured}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
             if not found > 0.0:
-                reason = f"the fitted {name} is {found:.4g} {self._unit_of(name)}, a passive object has > 0"
+                value = found / self._data.force_unit.scale
+                reason = f"the fitted {name} is {value:.4g} {self._unit_of(name)}, a passive object has > 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions
 

@@ -7,7 +7,6 @@ correlated noise break this: then structure is fitted that is not there.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -189,40 +188,42 @@ def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> f
 LARGE_OFFSET_RATIO = 1e3
 """Ratio of the mean force to the range of the force above which the mean is subtracted before the fit [-]."""
 
-UNSCALED_EXPONENT = 50
-"""A force whose size is from 2^-n to 2^n, with this number n, is not scaled for the fit [-]."""
+FIT_STEP = 2.0**-30
+"""Step of the positions in the unit box and of the scaled forces of a fit: far below the step of a sensor,
+far above a rounding error."""
+
+
+def stepped(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns scaled positions or forces, rounded to whole steps of a fit.
+
+    Recordings that differ by rounding errors, as those in other units or with other digits do, then have the
+    same scaled values and get the same model. The search for wavelets would amplify the rounding errors.
+    """
+    return np.asarray(np.rint(values / FIT_STEP) * FIT_STEP)
 
 
 @dataclass(frozen=True)
 class ForceScale:
-    """Scale of the force for the fit: the fit uses (force - offset) * factor."""
+    """Scale of the force for the fit: the fit uses (force - offset) * factor, in whole steps."""
 
     offset: float = 0.0
     factor: float = 1.0
 
     @classmethod
     def of(cls, force: Float1D, options: IdentifyOptions) -> ForceScale:
-        """Returns the scale that avoids overflow and lost digits for a force (n,); ordinary forces are not
-        scaled.
+        """Returns the scale of a force (n,): its range is 1 in the fit, or a constant force.
 
-        The criterion "perceptual" compares errors with the local force, so that no offset is subtracted for
-        it.
+        A large mean would cost digits and is subtracted. The criterion "perceptual" compares errors with the
+        local force, so that no offset is subtracted for it.
         """
         reach = float(np.ptp(force))
         mean = float(np.mean(force)) if reach > 0.0 and options.criterion != "perceptual" else 0.0
         offset = mean if abs(mean) > LARGE_OFFSET_RATIO * reach else 0.0
-        size = reach if offset else float(np.abs(force).max())
-        if size == 0.0:
-            return cls()
-        exponent = math.frexp(size)[1]
-        return cls(offset, 1.0 if abs(exponent) <= UNSCALED_EXPONENT else 2.0**-exponent)
-
-    def __bool__(self) -> bool:
-        return self.offset != 0.0 or self.factor != 1.0
+        return cls(offset, 1.0 / (reach or float(np.abs(force).max()) or 1.0))
 
     def scaled(self, force: Float1D) -> Float1D:
         """Returns the scaled force (n,) for the fit."""
-        return (force - self.offset) * self.factor
+        return stepped((force - self.offset) * self.factor)
 
     def scaled_options(self, options: IdentifyOptions) -> IdentifyOptions:
         """Returns the options with their forces and slopes in the scale of the fit."""

@@ -23,7 +23,7 @@ from ...verdict import Finding, no, usable
 from ..log import Log
 from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
-from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
+from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated, stepped
 from .repeats import Repeats
 from .strokes import stated_strokes, strokes_of
 
@@ -90,7 +90,7 @@ class Rows:
     position_unit: Unit = UNSTATED_UNIT
     """Unit of position in messages"""
     force_unit: Unit = UNSTATED_UNIT
-    """Unit of force in messages; not stated if the forces are scaled"""
+    """Unit of force in messages"""
 
     @cached_property
     def lower(self) -> Float1D:
@@ -110,7 +110,7 @@ class Rows:
     def path(self) -> Float2D:
         """(n, d) positions minus the smallest position, divided by the side lengths of the unit box; those of
         a periodic force law may be outside [0, 1)."""
-        return (self.positions - self.lower) / self.reach
+        return stepped((self.positions - self.lower) / self.reach)
 
     @cached_property
     def box(self) -> Float2D:
@@ -175,7 +175,7 @@ class Rows:
             force=scale.scaled(self.force),
             within=self.within * scale.factor**2,
             parts=[replace(part, force=scale.scaled(part.force)) for part in self.parts],
-            force_unit=self.force_unit if scale.factor == 1.0 else UNSTATED_UNIT,
+            force_unit=replace(self.force_unit, scale=scale.factor),
         )
 
     def limited(self) -> Rows:

@@ -166,12 +166,8 @@ class FittedNetwork:
 
     def unscaled(self, scale: ForceScale, force_unit: Unit = UNSTATED_UNIT) -> FittedNetwork:
         """Returns the network in the unit of the recorded force, without the offset and factor of the fit."""
-
         factor = scale.factor
         log = replace(self.log, path=[replace(point, rmse=point.rmse / factor) for point in self.log.path])
-        if factor != 1.0:
-            multiplied = f"For the fit, and in these notes, the recorded forces are multiplied by {factor:g}."
-            log = Log(notes=[multiplied]) + log
         if scale.offset:
             offset = force_unit.text(scale.offset)
             text = f"An offset of {offset} was subtracted from the recorded force for the fit."
