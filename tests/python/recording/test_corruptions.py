@@ -17,6 +17,10 @@ def test_a_corrupted_recording_gives_a_correct_error_or_a_warning_that_names_a_c
     assert [described(each) for each in outcomes if each.unreported] == []
 
 
+RELAXING = {"switch_springs/linear_housing_tx_short_45g.csv": "relaxation"}
+"""Clean recordings whose force changes while the tool waits, by 2 gf, and the cause to be named"""
+
+
 @pytest.mark.parametrize(
     "name",
     sampled(
@@ -27,7 +31,11 @@ def test_a_corrupted_recording_gives_a_correct_error_or_a_warning_that_names_a_c
         "keyswitches/clicky__cherry_mx_blue.csv",
     ),
 )
-def test_a_clean_recording_gets_the_verdict_good(name: str) -> None:
+def test_a_clean_recording_gets_the_verdict_good_unless_its_force_changes_in_a_wait(name: str) -> None:
     found = clean_outcome(name)
-    assert found.level == "good", described(found)
+    if name in RELAXING:
+        assert found.level == "usable", described(found)
+        assert [RELAXING[name] in reason for reason in found.reasons] == [True]
+    else:
+        assert found.level == "good", described(found)
     assert found.correct_error, described(found)
