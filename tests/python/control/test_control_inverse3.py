@@ -113,15 +113,15 @@ def test_a_negative_axis_reverses_the_force(spring: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("service", "reason", "zero_force"),
+    ("fault", "reason", "zero_force"),
     [
-        (Service(unplug_after=300), "fault of the device", UNCONFIRMED),
-        (Service(close_after=300), "fault of the device", "zero force could not be sent"),
-        (Service(garbage_after=300), "fault of the device", "zero force sent and confirmed"),
-        (Service(garbage_after=300, garbage_messages=10**9), "fault of the device", UNCONFIRMED),
-        (Service(renamed_after=300), "fault of the device", UNCONFIRMED),
-        (Service(silent_after=300), "Timeout", UNCONFIRMED),
-        (Service(force_key="values"), "fault of the device", "zero force sent and confirmed"),
+        ({"unplug_after": 300}, "fault of the device", UNCONFIRMED),
+        ({"close_after": 300}, "fault of the device", "zero force could not be sent"),
+        ({"garbage_after": 300}, "fault of the device", "zero force sent and confirmed"),
+        ({"garbage_after": 300, "garbage_messages": 10**9}, "fault of the device", UNCONFIRMED),
+        ({"renamed_after": 300}, "fault of the device", UNCONFIRMED),
+        ({"silent_after": 300}, "Timeout", UNCONFIRMED),
+        ({"force_key": "values"}, "fault of the device", "zero force sent and confirmed"),
     ],
     ids=[
         "unplugged",
@@ -134,9 +134,9 @@ def test_a_negative_axis_reverses_the_force(spring: Path) -> None:
     ],
 )
 def test_a_fault_ends_the_run_with_a_record_and_the_truth_about_zero_force(
-    spring: Path, tmp_path: Path, service: Service, reason: str, zero_force: str
+    spring: Path, tmp_path: Path, fault: dict[str, Any], reason: str, zero_force: str
 ) -> None:
-    out = tmp_path / "rendered.csv"
+    out, service = tmp_path / "rendered.csv", Service(**fault)
     with render_on_service(spring, "--duration-s", 2, "--record", out, service=service) as (completed, _):
         assert completed.returncode == 1, completed.stderr
     assert reason in completed.stderr
