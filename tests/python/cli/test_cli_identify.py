@@ -384,9 +384,9 @@ def test_a_file_read_by_parts_belongs_to_no_object(folder: Path, capsys: pytest.
 def test_a_late_force_is_found_and_its_correction_improves_the_model(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    time, random = 2e-3 * np.arange(3000), np.random.default_rng(0)
-    speed = 2.0 * np.pi * np.where(time < 3.0, 2.0 / 3.0, 4.0 / 3.0)
-    position = 2e-3 * (1.0 - np.cos(2e-3 * np.cumsum(speed)))
+    time, random = 4e-3 * np.arange(750), np.random.default_rng(0)
+    speed = 2.0 * np.pi * np.where(time < 1.5, 2.0 / 3.0, 4.0 / 3.0)
+    position = 2e-3 * (1.0 - np.cos(4e-3 * np.cumsum(speed)))
     wall = 300.0 * position + 4000.0 * np.maximum(position - 2.4e-3, 0.0)
     force = np.interp(time - 0.02, time, wall) + random.normal(0.0, 0.005, len(time))
     Recording.from_arrays(position, force, time).write(folder / "a.csv")
@@ -406,10 +406,10 @@ def test_a_late_force_is_found_and_its_correction_improves_the_model(
 
 
 def knob_file(path: Path) -> Path:
-    """Writes three turns of a knob with 24 detents, with a pause at the end, in deg and mNm."""
-    angle = press_and_release(1800, 1080.0)
-    angle = np.insert(angle, [1800] * 100, 1080.0)
-    way = np.repeat([1.0, 0.0, -1.0], [1800, 100, 1800])
+    """Writes two turns of a knob with 24 detents, with a pause at the end, in deg and mNm."""
+    angle = press_and_release(600, 720.0)
+    angle = np.insert(angle, [600] * 100, 720.0)
+    way = np.repeat([1.0, 0.0, -1.0], [600, 100, 600])
     torque = knob(angle) + 2.5 * way + np.random.default_rng(1).normal(0.0, 0.25, len(angle))
     rows = (f"{x:.4f},{f:.4f}" for x, f in zip(angle, torque, strict=True))
     path.write_text("\n".join(["angle_deg,torque_mNm", *rows, ""]), encoding="utf-8")
@@ -435,7 +435,7 @@ def test_a_period_that_is_found_and_rows_that_wait_are_printed(
     (rows,) = (line for line in printed.splitlines() if line.startswith("rows "))
     waiting = int(rows.split()[1])
     assert waiting == pytest.approx(100, abs=5)
-    assert rows == f"rows                 {waiting} of 3700 rows are not fitted: {waiting} wait in contact"
+    assert rows == f"rows                 {waiting} of 1300 rows are not fitted: {waiting} wait in contact"
     assert "period               the force repeats every 15 deg\n" in printed
     assert "outside" not in printed
 

@@ -218,7 +218,7 @@ def _raise_alarm(_number: int, _frame: Any) -> None:
 
 
 def test_a_signal_ends_a_long_simulation_within_200_ms() -> None:
-    """Judges the fastest of three simulations, because the test machine may be busy."""
+    """Judges the fastest of at most three simulations, because the test machine may be busy."""
     model = model_by_hand()
     scheme, device, hand = Scheme(), DeviceProfile(), Hand()
     delays_s = []
@@ -230,6 +230,8 @@ def test_a_signal_ends_a_long_simulation_within_200_ms() -> None:
             with pytest.raises(_AlarmError):
                 _core.simulation.simulate(model, scheme, device, hand, 3600.0)
             delays_s.append(time.monotonic() - due_s)
+            if delays_s[-1] < 0.2:
+                break
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, previous_handler)
@@ -251,14 +253,15 @@ def test_a_signal_ends_a_long_closed_loop(simulation_name: str) -> None:
 
 def test_progress_is_called_during_the_simulation() -> None:
     ticks: list[int] = []
-    _core.simulation.simulate(
-        model_by_hand(),
-        Scheme(structure="implicit"),
-        DeviceProfile(),
-        Hand(),
-        1500.0,  # simulated time [s] in which the progress is reported several times
-        progress=ticks.append,
-    )
+
+    def report(tick: int) -> None:
+        ticks.append(tick)
+        if len(ticks) == 3:
+            raise _AlarmError
+
+    scheme = Scheme(structure="implicit")
+    with pytest.raises(_AlarmError):
+        _core.simulation.simulate(model_by_hand(), scheme, DeviceProfile(), Hand(), 3600.0, progress=report)
     assert ticks[0] == 0
     assert ticks == sorted(ticks)
     assert len(ticks) > 1

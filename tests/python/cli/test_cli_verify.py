@@ -140,12 +140,10 @@ def test_a_simulated_recording_is_never_called_measured(
     recording = replace(read_recording("a.csv"), metadata=metadata)
     model = load_model("m.json")
     legends: list[str] = []
-    savefig = Figure.savefig
 
-    def record_legends(figure: Figure, *arguments: Any, **options: Any) -> None:
+    def record_legends(figure: Figure, *_: Any, **__: Any) -> None:
         captured = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
         legends.extend(text.get_text() for legend in captured if legend for text in legend.get_texts())
-        savefig(figure, *arguments, **options)
 
     monkeypatch.setattr(Figure, "savefig", record_legends)
     picture_verification(Path("a.png"), model, [(recording, verify(model, recording))])

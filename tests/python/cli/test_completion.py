@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from palpate.cli.completion import SHELLS, files_with
 PROGRAMS = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
 IN_BASH = """
-eval "$(palpate --completion bash)"
+eval "$SCRIPT"
 compopt() { echo "compopt $*"; }
 COMP_WORDS=("$@")
 COMP_CWORD=$(($# - 1))
@@ -39,9 +40,15 @@ def run(command: list[str], folder: Path, **variables: str) -> str:
     return completed.stdout
 
 
+@cache
+def script(shell: str) -> str:
+    """Returns the script that palpate prints for a shell."""
+    return run(["palpate", "--completion", shell], Path.cwd())
+
+
 def in_bash(folder: Path, *words: str) -> list[str]:
     needs("bash")
-    return run(["bash", "-c", IN_BASH, "bash", *words], folder).split()
+    return run(["bash", "-c", IN_BASH, "bash", *words], folder, SCRIPT=script("bash")).split()
 
 
 @pytest.fixture
@@ -124,5 +131,5 @@ def test_a_name_that_needs_quotes_is_completed_by_the_shell(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_the_script_of_each_shell_is_printed(shell: str, tmp_path: Path) -> None:
-    assert "_PALPATE_COMPLETE" in run(["palpate", "--completion", shell], tmp_path)
+def test_the_script_of_each_shell_is_printed(shell: str) -> None:
+    assert "_PALPATE_COMPLETE" in script(shell)

@@ -5,7 +5,6 @@ import json
 import mmap
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -97,15 +96,16 @@ def test_wrong_settings_are_refused(settings: dict[str, object], sentence: str) 
         render(Scheme(), **settings)
 
 
-def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
+def test_an_existing_recording_is_refused_and_replaced_with_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "rendered.csv"
     out.write_text("precious", encoding="utf-8")
     with pytest.raises(ValueError, match=r"rendered.csv exists already; .* replace it with --force"):
         render(Scheme(), duration_s=0.3, record=str(out))
     command = [*COMMAND, "--duration-s", "0.8", "--record", str(out)]
-    refused = run(*command)
-    assert refused.returncode == 2
-    assert refused.stderr.startswith(f"error: {out} exists already; choose another name, or ")
+    assert main(list(map(str, command[3:]))) == 2
+    assert capsys.readouterr().err.startswith(f"error: {out} exists already; choose another name, or ")
     assert out.read_text(encoding="utf-8") == "precious"
     assert run(*command, "--force").returncode == 0
     assert len(every_row(out)) == 800
@@ -172,10 +172,9 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
     assert json.loads(output)["recorded"] == len(every_row(out))
 
 
-def test_the_verb_reports_a_bad_rate_in_one_sentence() -> None:
-    completed = subprocess.run([*COMMAND, "--rate-hz", "5"], capture_output=True, text=True, check=False)
-    assert completed.returncode == 2
-    assert completed.stderr.splitlines()[-1].startswith("error: rate_hz is 5")
+def test_the_verb_reports_a_bad_rate_in_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["render", str(MODEL), "--rate-hz", "5"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("error: rate_hz is 5")
 
 
 def test_render_accepts_the_simulated_device_by_name(tmp_path: Path) -> None:
@@ -224,13 +223,11 @@ def test_a_usb_device_receives_the_force_and_zero_at_the_end(tmp_path: Path) -> 
     ],
 )
 def test_an_unknown_device_is_refused_before_anything_is_written(
-    device: str, sentence: str, tmp_path: Path
+    device: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "rendered.csv"
-    command = [*COMMAND, "--device", device, "--record", str(out)]
-    completed = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert completed.returncode == 2
-    last_line = completed.stderr.splitlines()[-1]
+    assert main(["render", str(MODEL), "--device", device, "--record", str(out)]) == 2
+    last_line = capsys.readouterr().err.splitlines()[-1]
     assert last_line.startswith("error: ")
     assert sentence in last_line
     assert list(tmp_path.iterdir()) == []

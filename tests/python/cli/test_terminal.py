@@ -161,7 +161,7 @@ def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
         "import click, numpy as np\n"
         "from palpate.cli.exit_status import interrupted_at_once\n"
         "with interrupted_at_once():\n"
-        "    matrix = np.random.default_rng(0).normal(size=(4000, 4000))\n"
+        "    matrix = np.random.default_rng(0).normal(size=(3000, 3000))\n"
         "    print('begins', flush=True)\n"
         "    np.linalg.svd(matrix)\n"
     )
@@ -170,11 +170,11 @@ def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begins\n"
-        time.sleep(0.5)
+        time.sleep(0.2)
         sent_at_s = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, messages = process.communicate(timeout=60)
-        # Ctrl-C ends a computation of one minute after 0.2 s, or later if other tests load the machine.
+        # Ctrl-C ends a computation of many seconds after 0.2 s, or later if other tests load the machine.
         assert time.monotonic() - sent_at_s < 3.0
     assert process.returncode == 130
     assert messages == "error: interrupted; nothing was written\n"

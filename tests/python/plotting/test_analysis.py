@@ -18,10 +18,17 @@ VIEWS = ("history", "position", "spectrum", "short-time", "wavelet")
 
 
 def views(recording: Recording) -> dict[str, Axes]:
+    """Returns the axes of all views, which contain their lines and texts before the figure is drawn."""
     figure = Figure(figsize=(12.0, 4.0), layout="constrained")
     axes: dict[str, Axes] = figure.subplot_mosaic([list(VIEWS)])  # type: ignore[list-item]
     draw_views(axes, recording, history_of(recording))
-    figure.draw_without_rendering()
+    return axes
+
+
+def drawn(recording: Recording) -> dict[str, Axes]:
+    """Returns the axes of all views after the figure was drawn."""
+    axes = views(recording)
+    axes["history"].figure.draw_without_rendering()
     return axes
 
 
@@ -34,7 +41,7 @@ def with_time(n: int = 4000, amplitude: float = 2e-3) -> Recording:
 @pytest.fixture(scope="module")
 def timed() -> dict[str, Axes]:
     """Returns the views of a recording with time."""
-    return views(with_time())
+    return drawn(with_time())
 
 
 def mesh_of(axes: Axes) -> Any:
@@ -64,7 +71,7 @@ def test_labels_state_the_units_of_a_recording_without_time(unit: str, label: st
     scale = 1e-3 if unit == "m" else 1.0
     x = scale * np.linspace(0.0, 4.0, 500)
     recording = Recording.from_arrays(x, np.sin(9.0 * x / scale), units={"position": unit, "force": "N*m"})
-    axes = views(recording)
+    axes = drawn(recording)
     assert {axes[name].get_ylabel() for name in VIEWS[2:]} == {label}
     assert axes["history"].get_xlabel() == axes["short-time"].get_xlabel() == axes["position"].get_xlabel()
     assert axes["spectrum"].get_xlabel() == "power [(N\u00b7m)\u00b2]"
@@ -98,7 +105,7 @@ def test_a_short_peak_stays_visible_in_few_columns() -> None:
     ("n", "amplitude"), sampled([(10, 0.0), (10, 1.0), (11, 0.0), (11, 1.0)], (10, 1.0), (11, 0.0))
 )
 def test_short_and_constant_recordings_are_drawn(n: int, amplitude: float) -> None:
-    axes = views(with_time(n, amplitude))
+    axes = drawn(with_time(n, amplitude))
     assert all(each.has_data() for each in axes.values())
 
 
