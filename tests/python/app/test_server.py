@@ -170,7 +170,7 @@ def test_a_stopped_identification_leaves_the_page_as_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    sample_recording(seed=1, duration_s=1.0).write("knob.csv")
+    sample_recording(seed=1, duration_s=0.5).write("knob.csv")
     server = Server(Session(tmp_path, Impatient()), "token", "127.0.0.1:1")
     server.added("knob.csv", Path("knob.csv").read_bytes())
     before = server.session.state

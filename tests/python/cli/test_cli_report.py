@@ -2,6 +2,7 @@
 """palpate report: written page, printed result, exit codes, and refused input."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -13,12 +14,22 @@ from palpate.verdict import Verdict, no
 from test_cli_identify import spring
 
 
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Writes two recordings of a spring and a model of the first, and returns their folder."""
+    folder = tmp_path_factory.mktemp("identified")
+    spring(folder / "b.csv", seed=1)
+    with pytest.MonkeyPatch.context() as context:
+        context.chdir(folder)
+        spring(folder / "a.csv")
+        assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(identified: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copytree(identified, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    spring(tmp_path / "a.csv")
-    spring(tmp_path / "b.csv", seed=1)
-    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
     return tmp_path
 
 

@@ -54,7 +54,7 @@ def stiffness(model: Model) -> float:
 def test_the_rendering_of_a_device_is_recorded(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
     device = ["--model", "10", "--no-transducer"]
-    completed = run_record(out, "--device-renders", "--json", device=device)
+    completed = run_record(out, "--device-renders", "--json", "--duration-s", 0.8, device=device)
     assert completed.returncode == 0, completed.stderr
     assert json.loads(completed.stdout)["device_model"] == "0123456789abcdef"
     recording = read_recording(out)
@@ -91,10 +91,11 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
 ) -> None:
     names = ("a.csv", "b.csv", "m.json", "t.csv")
     recording_file, rendered_file, model_file, trace = (tmp_path / name for name in names)
-    completed = run_record(recording_file, "--json", device=[*SPRING, "--trace", str(trace)])
+    duration = ["--duration-s", 1]
+    completed = run_record(recording_file, "--json", *duration, device=[*SPRING, "--trace", str(trace)])
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
-    assert summary["recorded"] == summary["ticks"] == 1500
+    assert summary["recorded"] == summary["ticks"] == 1000
     # the motor of the device is never enabled: only the hand moves the handle
     assert not any(frame.enabled for frame in frames(trace))
     recording = read_recording(recording_file)
@@ -104,7 +105,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     model.save(model_file)
 
     command = [PROGRAM, model_file, "--device", "usb", "--structure", "direct", "--uncertified"]
-    command = [*command, "--duration-s", 1.5, "--record", rendered_file]
+    command = [*command, *duration, "--record", rendered_file]
     completed = emulated(*command, device=["--trace", str(trace)])
     assert completed.returncode == 0, completed.stderr
     # After the start ramp the device receives a torque towards smaller positions, proportional to position.
@@ -147,7 +148,7 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
     probe = ["--probe", "--upper", 0.1, "--stiffness", 1, *arguments]
     weak_device = ["--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
-    completed = run_record(out, *probe, device=weak_device)
+    completed = run_record(out, *probe, "--duration-s", 1.25, device=weak_device)
     assert completed.returncode == 0, completed.stderr
     assert 0.02 < max(abs(frame.torque) for frame in frames(trace)) <= 0.05
     assert len(read_recording(out)) > 1000
@@ -178,7 +179,7 @@ def test_an_impossible_recording_is_refused_before_the_device_moves(
 @needs_emulation
 def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
-    unplugged_device = [*SPRING, "--fault", "unplug@1500", "--trace", str(trace)]
+    unplugged_device = [*SPRING, "--fault", "unplug@500", "--trace", str(trace)]
     completed = run_record(out, "--json", "--duration-s", "inf", device=unplugged_device)
     assert completed.returncode == 1
     assert "a fault of the device" in completed.stderr

@@ -66,8 +66,22 @@ def planned() -> Model:
 
 
 @pytest.fixture(scope="module")
-def page(planned: Model) -> Parsed:
-    return parsed(planned, recording(model_by_hand(), seed=1))
+def long() -> Recording:
+    """Returns a fresh recording of so many rows that a page with all of them would be too large."""
+    return recording(model_by_hand(), seed=1, n=20_000)
+
+
+@pytest.fixture(scope="module")
+def written(planned: Model, long: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Writes the page of the planned model with the long recording, and returns its file."""
+    file = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(planned, long, to=file)
+    return file
+
+
+@pytest.fixture(scope="module")
+def page(written: Path) -> Parsed:
+    return Parsed(written.read_text(encoding="utf-8"))
 
 
 def test_a_planned_model_with_a_fresh_recording_has_every_section_in_order(page: Parsed) -> None:
@@ -83,7 +97,7 @@ def test_every_section_has_a_heading_and_one_sentence_of_explanation(planned: Mo
 
 
 def test_the_verdict_is_the_first_section_in_words_with_every_finding() -> None:
-    model = model_by_hand()
+    model = model_of_two_inputs("lateral")
     model.notes["verdict"] = Verdict((usable("few rows: record more"), no("the sensor is stuck"))).record()
     page = parsed(model)
     assert page.all("section")[0]["id"] == "verdict"
@@ -98,16 +112,15 @@ def test_the_verdict_of_each_part_is_named(page: Parsed) -> None:
         assert part in text
 
 
-def test_key_numbers_are_those_of_the_verification(planned: Model, page: Parsed) -> None:
-    found = palpate.verify(planned, recording(model_by_hand(), seed=1))
+def test_key_numbers_are_those_of_the_verification(planned: Model, long: Recording, page: Parsed) -> None:
+    found = palpate.verify(planned, long)
     assert f"{100 * found.nrmse:.3g} %" in page.text["numbers"]
     assert f"{100 * found.within_jnd:.3g} %" in page.text["numbers"]
     assert "ms" in page.text["numbers"]
 
 
-def test_the_page_is_small_and_fetches_nothing(planned: Model, page: Parsed, tmp_path: Path) -> None:
-    write_report(planned, recording(model_by_hand(), seed=1, n=20_000), to=tmp_path / "report.html")
-    assert (tmp_path / "report.html").stat().st_size < MOST_BYTES
+def test_the_page_is_small_and_fetches_nothing(written: Path, page: Parsed) -> None:
+    assert written.stat().st_size < MOST_BYTES
     for tag, attributes in page.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base", "img")
         assert not [name for name in NETWORK_ATTRIBUTES if attributes.get(name)], tag
@@ -129,7 +142,7 @@ def test_the_page_states_its_language_and_describes_every_chart(page: Parsed) ->
 def test_texts_of_files_cannot_become_elements(tmp_path: Path) -> None:
     word = "<script>alert(1)<img src=x>"
     file = tmp_path / f"{word}.csv"
-    given = recording(model_by_hand())
+    given = recording(model_by_hand(), n=100)
     lines = [f"# operator: {word}</b>", f"depth {word} [rad],force & {word} [Nm]"]
     lines += [f"{x:.6g},{f:.6g}" for x, f in zip(given.position, given.force, strict=True)]
     file.write_text("\n".join([*lines, ""]), encoding="utf-8")
@@ -145,10 +158,10 @@ def test_texts_of_files_cannot_become_elements(tmp_path: Path) -> None:
     assert page.text[""].count("<script>alert(1)") == 2
 
 
-def test_names_of_inputs_cannot_become_elements() -> None:
-    names = ("position", "<script>alert(1)</script>")
-    model = model_by_hand(
-        inputs=names,
+def model_of_two_inputs(second: str) -> Model:
+    """Returns a model whose page has no charts, which take most of the time."""
+    return model_by_hand(
+        inputs=("position", second),
         kind="general",
         alpha=[[9.0, 9.0]],
         beta=[[0.2, 0.2]],
@@ -156,7 +169,10 @@ def test_names_of_inputs_cannot_become_elements() -> None:
         lower=[0.0, 0.0],
         upper=[1.0, 1.0],
     )
-    page = parsed(model)
+
+
+def test_names_of_inputs_cannot_become_elements() -> None:
+    page = parsed(model_of_two_inputs("<script>alert(1)</script>"))
     assert len(page.all("script")) == 3
     assert "<script>alert(1)</script>" in page.text["wavelets"]
 
@@ -172,7 +188,7 @@ def test_sections_without_data_name_the_reason() -> None:
 
 
 def test_a_hysteresis_model_shows_press_and_release_with_its_band() -> None:
-    given = recording(keyswitch_by_hand())
+    given = recording(keyswitch_by_hand(), n=100)
     model = palpate.identify(given)
     assert model.hysteretic
     text = part(compared(model, given), force_curve).text["force-curve"]
@@ -260,12 +276,17 @@ def test_a_plan_that_cannot_be_read_leaves_the_model_readable(planned: Model, tm
     assert "Left out: the plan in the model file cannot be read" in page.text["certificate"]
 
 
-def test_a_plan_with_verdict_no_sets_the_verdict_of_the_report() -> None:
-    steep = model_by_hand(alpha=[[400.0]], weight=[1.0])
-    plan = palpate.plan(steep, DeviceProfile(viscous_damping=0.002, coulomb_friction=0.0001))
-    assert plan.verdict.level == "no"
-    subject = Subject(steep, plan=plan)
-    report = report_of(subject)
+@pytest.fixture(scope="module")
+def refused() -> Subject:
+    """Returns a model with a plan whose verdict is no."""
+    subject = Subject.of(keyswitch_by_hand()).planned_on(DeviceProfile.load(example_profiles()["touch"][0]))
+    assert subject.plan is not None
+    assert subject.plan.verdict.level == "no"
+    return subject
+
+
+def test_a_plan_with_verdict_no_sets_the_verdict_of_the_report(refused: Subject) -> None:
+    report = report_of(refused)
     assert report.verdict.level == "no"
     assert Parsed(report.html).text["verdict"].startswith("Verdict no")
 
@@ -305,7 +326,7 @@ def test_the_origin_names_files_fingerprints_rows_and_versions(tmp_path: Path) -
 
 
 def test_held_out_rows_are_compared_and_the_others_give_the_band() -> None:
-    given = recording(model_by_hand())
+    given = recording(model_by_hand(), n=100)
     model = palpate.identify(given.split(5)[0])
     subject = Subject.of(model).compared_with(given)
     assert subject.verification is not None
@@ -330,7 +351,7 @@ def test_without_bokeh_the_message_names_the_command(
 
 
 def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(tmp_path: Path) -> None:
-    model = model_by_hand()
+    model = model_of_two_inputs("lateral")
     target = tmp_path / "report.html"
     target.write_text("old", encoding="utf-8")
     target.chmod(0o640)
@@ -349,11 +370,8 @@ def test_residuals_without_time_are_in_the_order_of_position(
     assert "in the order of position" in page.text["whiteness"]
 
 
-def test_the_section_of_a_plan_states_the_profile_of_the_device() -> None:
-    subject = Subject.of(keyswitch_by_hand()).planned_on(DeviceProfile.load(example_profiles()["touch"][0]))
-    assert subject.plan is not None
-    assert subject.plan.verdict.level == "no"
-    text = part(subject, certificate_table).text["certificate"]
+def test_the_section_of_a_plan_states_the_profile_of_the_device(refused: Subject) -> None:
+    text = part(refused, certificate_table).text["certificate"]
     for number in (
         "viscous damping b: 0.05 N·s/m",
         "Coulomb friction f_c: 0.13 N",
@@ -364,7 +382,7 @@ def test_the_section_of_a_plan_states_the_profile_of_the_device() -> None:
         assert number in text
     assert "docs/certificate.md" not in text, "a reader of the page has no folder docs"
     assert "reserve 0 N" not in " ".join(text.split())
-    assert "the plan limits the slopes of the force" in str(subject.verdict)
+    assert "the plan limits the slopes of the force" in str(refused.verdict)
 
 
 def test_a_line_does_not_break_inside_an_option() -> None:
