@@ -74,22 +74,24 @@ def test_a_contact_behind_the_stop_is_refused() -> None:
 
 
 def test_an_edited_object_is_identified_with_its_numbers() -> None:
-    model = palpate.identify(recording_of(switch(), model_of_the_switch(), "none"))
+    model = palpate.identify(recording_of(switch(), source(), "none"))
     found = edited(Curves.of(model), {"peak force": 0.6, "hysteresis": 0.5})
     recording = recording_of(found, model, "peak force 0.6 N")
     assert recording.metadata["edited"].startswith("peak force 0.6 N; from the model of")
-    again = Curves.of(palpate.identify(recording))
+    between = np.arange(len(recording)) % 4 > 0
+    again = Curves.of(palpate.identify(recording.without(between)))
     assert value_of(again, "peak force") == pytest.approx(0.6, rel=0.01)
     assert value_of(again, "lost work") == pytest.approx(0.5 * value_of(switch(), "lost work"), rel=0.02)
 
 
 @cache
-def model_of_the_switch() -> palpate.Model:
-    return palpate.identify(switch().position, switch().press)
+def source() -> palpate.Model:
+    """Returns a model, of which an edited recording takes only the units and the names of the files."""
+    return palpate.identify(switch().position, switch().position)
 
 
 def test_an_edited_recording_keeps_the_units_of_the_file(tmp_path: Path) -> None:
-    made = recording_of(switch(), model_of_the_switch(), "peak force 60 gf")
+    made = recording_of(switch(), source(), "peak force 60 gf")
     made = replace(made, units={"position": "m", "force": "N"})
     write_recording(made, {"position": UNITS["mm"], "force": UNITS["gf"]}, tmp_path / "edited.csv")
     read = palpate.read_recording(tmp_path / "edited.csv")

@@ -154,24 +154,42 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
     assert len(read_recording(out)) > 1000
 
 
+EVERY_EXIT_CODE = """
+import json, sys
+from palpate.cli.main import main
+print([main(command) for command in json.loads(sys.argv[1])])
+"""
+"""Program that runs commands one after the other and prints their exit codes"""
+
+
 @needs_emulation
 @pytest.mark.parametrize(
-    ("arguments", "device", "reason"),
+    ("device", "refusals"),
     [
-        ([], ["--no-transducer"], "EMU-1 has no force transducer"),
-        (["--probe"], [], "a probe on a real device needs upper"),
-        (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6: must be at most 5"),
-        (["--object", OBJECT], [], "object needs device simulated; usb has a real object"),
-        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
+        (["--no-transducer"], {"EMU-1 has no force transducer": []}),
+        (
+            [],
+            {
+                "a probe on a real device needs upper": ["--probe"],
+                "force_limit is 6: must be at most 5": ["--probe", "--upper", "0.3", "--force-limit", "6"],
+                "object needs device simulated; usb has a real object": ["--object", str(OBJECT)],
+            },
+        ),
+        (["--no-device"], {"no USB device 1209:0001 with this protocol is connected": []}),
     ],
 )
 def test_an_impossible_recording_is_refused_before_the_device_moves(
-    arguments: list[Any], device: list[str], reason: str, tmp_path: Path
+    device: list[str], refusals: dict[str, list[str]], tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    completed = run_record(tmp_path / "a.csv", *arguments, device=[*device, "--trace", str(trace)])
-    assert completed.returncode == 2, completed.stderr
-    assert reason in completed.stderr
+    record_usb = ["record", str(tmp_path / "a.csv"), "--device", "usb", "--duration-s", "1.5"]
+    commands = json.dumps([[*record_usb, *arguments] for arguments in refusals.values()])
+    program = [sys.executable, "-c", EVERY_EXIT_CODE, commands]
+    completed = emulated(*program, device=[*device, "--trace", str(trace)])
+    assert completed.stdout == f"{[2] * len(refusals)}\n", completed.stderr
+    errors = [line for line in completed.stderr.splitlines() if line.startswith("error: ")]
+    for reason, error in zip(refusals, errors, strict=True):
+        assert reason in error
     assert not list(tmp_path.glob("a.csv*"))
     assert all(frame.torque == 0.0 for frame in frames(trace))
 
