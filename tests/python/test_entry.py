@@ -8,7 +8,9 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -35,6 +37,16 @@ def frame(seed: int = 0) -> pd.DataFrame:
     )
 
 
+@cache
+def model_of_the_frame() -> Model:
+    return identify(frame())
+
+
+@cache
+def model_of_a_line() -> Model:
+    return identify(X, 2.0 * X)
+
+
 @pytest.fixture
 def press(tmp_path: Path) -> Path:
     frame().to_csv(tmp_path / "press.csv", index=False)
@@ -42,35 +54,35 @@ def press(tmp_path: Path) -> Path:
 
 
 def test_a_frame_a_file_and_arrays_give_the_same_model(press: Path) -> None:
-    model = identify(palpate.read_recording(press), max_wavelets=2)
+    def identified(*given: Any, **more: Any) -> Model:
+        return identify(*given, inputs="position,hysteresis", max_wavelets=1, **more)
+
+    model = identified(palpate.read_recording(press))
     assert model.kind == "hysteresis"
+    of_frame = identified(frame())
+    assert of_frame.units == model.units == {"position": "m", "force": "N"}
     for result in (
-        identify(press, max_wavelets=2),
-        identify(str(press), max_wavelets=2),
-        identify([press], max_wavelets=2),
-        identify(frame(), max_wavelets=2),
-        identify(1e-3 * X, 1e-3 * (1e3 * force()), direction=DIRECTION, max_wavelets=2),
-        identify(
-            list(1e-3 * X),
-            pd.Series(1e-3 * (1e3 * force())),
-            direction=list(DIRECTION),
-            max_wavelets=2,
-        ),
+        identified(press),
+        identified(str(press)),
+        identified([press]),
+        of_frame,
+        identified(1e-3 * X, 1e-3 * (1e3 * force()), direction=DIRECTION),
+        identified(list(1e-3 * X), pd.Series(1e-3 * (1e3 * force())), direction=list(DIRECTION)),
     ):
         assert np.array_equal(result.alpha, model.alpha)
         assert np.array_equal(result.weight, model.weight)
         assert result.fit.nrmse == model.fit.nrmse
-    assert identify(frame(), max_wavelets=2).units == model.units == {"position": "m", "force": "N"}
 
 
 def test_a_list_may_mix_recordings_files_and_frames(press: Path) -> None:
-    model = identify([press, frame(1), Recording.from_frame(frame(2))])
+    mixed = [press, frame(1), Recording.from_frame(frame(2))]
+    model = identify(mixed, inputs="position,hysteresis", max_wavelets=1)
     assert model.data.rows == 3 * len(X)
     assert model.data.files == (str(press),)
 
 
 def test_verify_takes_files_frames_and_arrays(press: Path) -> None:
-    model = identify(press)
+    model = identify(press, inputs="position,hysteresis")
     fresh = verify(model, frame(1))
     assert fresh.fresh
     assert fresh.nrmse == pytest.approx(model.fit.nrmse, rel=0.3)
@@ -79,7 +91,7 @@ def test_verify_takes_files_frames_and_arrays(press: Path) -> None:
     on_training_file = verify(model, press)
     assert not on_training_file.fresh
     assert on_training_file.nrmse == verify(model, str(press)).nrmse
-    assert not verify(identify(frame()), frame()).fresh
+    assert not verify(model_of_the_frame(), frame()).fresh
 
 
 def test_inputs_named_as_columns_are_read_from_files_and_frames(tmp_path: Path) -> None:
@@ -245,6 +257,7 @@ def test_help_and_members_work_without_scikit_learn() -> None:
     )
     assert "identify(recording" in output
     assert "WaveletNetworkRegressor needs scikit-learn" in output
+    assert "pip install palpate[sklearn]" in output
 
 
 @pytest.mark.full
@@ -269,10 +282,12 @@ def models() -> dict[str, Model]:
     random = np.random.default_rng(0)
     depth, lateral = random.uniform(0, 1, 200), random.uniform(0, 1, 200)
     return {
-        "line": identify(X, 2.0 * X),
-        "hysteresis": identify(frame()),
-        "damping": identify(x, 2.0 * x + 0.3 * np.gradient(x, t) + noise, time=t),
-        "two_inputs": identify(Recording.from_arrays(depth, depth * lateral, inputs={"lateral": lateral})),
+        "line": model_of_a_line(),
+        "hysteresis": model_of_the_frame(),
+        "damping": identify(x, 2.0 * x + 0.3 * np.gradient(x, t) + noise, time=t, max_wavelets=2),
+        "two_inputs": identify(
+            Recording.from_arrays(depth, depth * lateral, inputs={"lateral": lateral}), max_wavelets=2
+        ),
     }
 
 
@@ -288,8 +303,7 @@ def test_a_saved_and_reloaded_model_equals_the_original(tmp_path: Path) -> None:
 
 
 def test_a_printed_model_states_its_verdict_first() -> None:
-    line_model = identify(X, 2.0 * X)
-    assert str(line_model).splitlines()[0] == "verdict: good"
+    assert str(model_of_a_line()).splitlines()[0] == "verdict: good"
     ascending = np.argsort(X, kind="stable")
     unsorted_model = identify(X[ascending], force()[ascending])
     lines = str(unsorted_model).splitlines()

@@ -3,8 +3,6 @@
 
 import inspect
 import pickle
-import subprocess
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,7 @@ from any_input import SCALE
 from palpate import IdentifyOptions, SearchOptions, WaveletNetworkRegressor
 
 
-@parametrize_with_checks([WaveletNetworkRegressor(**({"max_wavelets": 2} if SCALE == 1 else {}))])
+@parametrize_with_checks([WaveletNetworkRegressor(**({"max_wavelets": 1} if SCALE == 1 else {}))])
 @pytest.mark.filterwarnings("ignore")
 def test_scikit_learn_estimator_checks_pass(estimator: Any, check: Any) -> None:
     check(estimator)
@@ -161,8 +159,8 @@ def test_it_works_inside_scikit_learn() -> None:
     assert chain.fit(frame, y).score(frame, y) > 0.99
     assert list(chain[-1].feature_names_in_) == ["depth"]
     assert chain[-1].network_.inputs == ("depth",)
-    assert cross_validate(WaveletNetworkRegressor(), X, y, cv=3)["test_score"].min() > 0.98
-    search = GridSearchCV(WaveletNetworkRegressor(), {"max_wavelets": np.arange(0, 5, 4)}, cv=3).fit(X, y)
+    assert cross_validate(WaveletNetworkRegressor(), X, y, cv=2)["test_score"].min() > 0.98
+    search = GridSearchCV(WaveletNetworkRegressor(), {"max_wavelets": np.arange(0, 5, 4)}, cv=2).fit(X, y)
     assert search.best_params_ == {"max_wavelets": 4}
 
 
@@ -180,18 +178,6 @@ def test_network_is_a_model_that_can_be_saved(tmp_path: Path) -> None:
     network = WaveletNetworkRegressor().fit(X, y)
     network.network_.save(tmp_path / "saddle.json")
     assert np.array_equal(palpate.load_model(tmp_path / "saddle.json").predict(X), network.predict(X))
-
-
-def test_missing_scikit_learn_is_reported_with_the_install_command() -> None:
-    code = (
-        "import sys; sys.modules['sklearn'] = None\n"
-        "import palpate\n"
-        "try: palpate.WaveletNetworkRegressor\n"
-        "except ImportError as error: print(error)"
-    )
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert answer.stdout.startswith("WaveletNetworkRegressor needs scikit-learn")
-    assert "pip install palpate[sklearn]" in answer.stdout
 
 
 def test_the_example_of_its_documentation_runs() -> None:

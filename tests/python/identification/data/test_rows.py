@@ -28,7 +28,7 @@ def contact(seed: int, n: int = 4000) -> Recording:
 
 
 def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_data() -> None:
-    model = identify(contact(0))
+    model = identify(contact(0), max_wavelets=6)
     assert (model.kind, model.inputs, model.fit.model_class) == (
         "position_velocity",
         ("position", "velocity"),
@@ -46,7 +46,7 @@ def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_da
 
 def test_refinement_gives_each_input_a_separate_dilation() -> None:
     random = np.random.default_rng(1)
-    X = random.uniform(0.0, 1.0, (3000, 2))
+    X = random.uniform(0.0, 1.0, (1500, 2))
     r2 = (20.0 * (X[:, 0] - 0.4)) ** 2 + (4.0 * (X[:, 1] - 0.6)) ** 2
     y = (r2 - 2.0) * np.exp(-0.5 * r2) + random.normal(0.0, 0.01, len(X))
     network = fit_environment(X, y)
@@ -57,20 +57,20 @@ def test_refinement_gives_each_input_a_separate_dilation() -> None:
 
 def test_input_without_influence_gets_no_wavelet() -> None:
     random = np.random.default_rng(2)
-    X = random.uniform(0.0, 1.0, (2000, 3))
+    X = random.uniform(0.0, 1.0, (600, 3))
     network = fit_environment(X, 3.0 * X[:, 0] - X[:, 1] + random.normal(0.0, 0.1, len(X)))
     assert (network.model_class, len(network.weight), network.n_parameters) == ("linear", 0, 4)
 
 
 def test_six_inputs_and_many_rows_need_no_grid() -> None:
     random = np.random.default_rng(3)
-    X = random.uniform(-1.0, 1.0, (30_000, 6))
+    X = random.uniform(-1.0, 1.0, (12_000, 6))
     truth = np.exp(-2.0 * (X[:, 0] ** 2 + X[:, 3] ** 2)) + 0.5 * X[:, 1]
     network = fit_environment(
         X,
         truth + random.normal(0.0, 0.02, len(X)),
         None,
-        IdentifyOptions(max_wavelets=6, search=SearchOptions(max_positions=64)),
+        IdentifyOptions(max_wavelets=4, search=SearchOptions(max_positions=64, max_candidates=1024)),
     )
     assert network.nrmse < 0.5
     assert any("rows are used, evenly spread" in note for note in network.log.rows)
@@ -99,7 +99,7 @@ def test_columns_are_named_as_in_the_file_and_their_units_converted(
 
 
 def test_velocity_is_derived_from_time_without_a_column() -> None:
-    t = np.arange(0.0, 20.0, 1e-3)
+    t = np.arange(0.0, 8.0, 1e-3)
     x = 0.5 - 0.5 * np.cos(2.0 * np.pi * (0.5 * t + 0.02 * t**2))
     v = np.gradient(x, t)
     noise = np.random.default_rng(4).normal(0.0, 0.01, len(t))
@@ -213,7 +213,7 @@ def test_data_longer_than_a_period_are_taken_modulo_the_period() -> None:
 @cache
 def forth_and_back() -> tuple[Recording, Model]:
     """Returns two revolutions of a knob with friction forth and back, and their model."""
-    time = 1e-3 * np.arange(8000)
+    time = 2e-3 * np.arange(4000)
     x = TURN * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
     friction = 0.2 * np.sign(np.gradient(x))
     force = np.sin(3.0 * x) + friction + np.random.default_rng(2).normal(0.0, 0.01, len(x))
@@ -240,7 +240,7 @@ def test_the_force_stays_near_the_recorded_range_where_a_stroke_has_no_rows() ->
 
 @pytest.mark.parametrize(("missing", "level"), [(0.02, "good"), (0.2, "usable"), (0.7, "no")])
 def test_a_part_of_the_period_without_rows_is_a_finding(missing: float, level: str) -> None:
-    verdict = identify(knob(1.0 - missing), period=TURN).verdict
+    verdict = identify(knob(1.0 - missing), period=TURN, max_wavelets=6).verdict
     assert verdict.level == level
     assert any("no position lies between" in reason for reason in verdict.reasons) == (level != "good")
 
