@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from conftest import sampled
 from palpate import InputError, Model, Recording, identify
 from palpate._core.dynamics import environment_filters
 from palpate.baselines import PaperNetwork, paper_force
@@ -66,10 +67,15 @@ def two_wavelets() -> tuple[SeparableProblem, Library]:
     return problem, Library(problem, frame)
 
 
-@pytest.mark.parametrize("quasi_newton", [False, True], ids=["frame-only", "quasi-newton"])
-@pytest.mark.parametrize("selection", SELECTIONS)
+NETWORKS = [(selection, quasi_newton) for selection in SELECTIONS for quasi_newton in (False, True)]
+
+
+@pytest.mark.parametrize(
+    ("selection", "quasi_newton"),
+    sampled(NETWORKS, ("orthogonal", True), *((selection, False) for selection in SELECTIONS)),
+)
 def test_every_selection_finds_a_wall(selection: str, quasi_newton: bool) -> None:
-    x, truth, y = wall(2000, 1)
+    x, truth, y = wall(1000, 1)
     network = PaperNetwork(selection, quasi_newton=quasi_newton)
     assert network.fit(x[:, None], y) is network
     assert np.std(network.predict(x[:, None]) - truth) < (0.008 if quasi_newton else 0.01)
@@ -78,7 +84,7 @@ def test_every_selection_finds_a_wall(selection: str, quasi_newton: bool) -> Non
 
 
 def test_quasi_newton_lowers_the_error_of_the_same_wavelets() -> None:
-    x, truth, y = wall(2000, 1, noise=0.001)
+    x, truth, y = wall(1000, 1, noise=0.001)
     kept, moved = (PaperNetwork(quasi_newton=each).fit(x[:, None], y) for each in (False, True))
     errors = [float(np.std(each.predict(x[:, None]) - truth)) for each in (kept, moved)]
     assert kept.n_wavelets_ == moved.n_wavelets_
