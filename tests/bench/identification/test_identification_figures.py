@@ -42,44 +42,27 @@ def result_row(problem: str, method: str, nrmse: float, n_parameters: int) -> di
     }
 
 
-@pytest.fixture
-def results_folder(tmp_path: Path) -> Path:
-    """Returns a folder with study results, as studies write them if measured recordings are missing."""
-    rows = [
+def measured_row(nrmse: float, **fields: Any) -> dict[str, Any]:
+    splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
+    row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}
+    spline_results = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
+    return {**row, **spline_results, "baselines": {"splines": splines}, **fields}
+
+
+PROBLEM = "contact, 6 inputs, 20000 rows"
+
+
+def results_of_methods() -> list[dict[str, Any]]:
+    """Returns the results of four methods; one method is missing on the machine."""
+    return [
         result_row("P1", "palpate", 3e-4, 20),
         result_row("P1", "splines", 5e-4, 44),
         {"problem": "P1", "method": "MARS", "skipped": "needs pyearth"},
         result_row("P3", "palpate", 8e-4, 58),
     ]
-    write_results(tmp_path, "compare_methods", rows)
-    write_results(tmp_path, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
-    write_results(tmp_path, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
-    return tmp_path
 
 
-def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> None:
-    names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
-    page = results_folder / "identification.md"
-    tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
-    # a new table of the page is empty until its study has run
-    page.write_text(tables.replace("old filters\n", ""))
-    main([str(results_folder), "--to", str(results_folder)])
-    for name in ("parameters", "time", "filters"):
-        assert (results_folder / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
-    text = page.read_text(encoding="utf-8")
-    assert "| P1, palpate | 3.00e-04 (1.50e-04 to 6.00e-04) | 6 (5 to 7) | 20 (17 to 23) |" in text
-    assert "| P1, splines | 5.00e-04 (2.50e-04 to 1.00e-03) |  | 44 (41 to 47) | 0.25 |" in text
-    assert "MARS" not in text
-    assert "| no wavelet | 99 | 100 |" in text
-    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
-    assert "of up to 12 draws" in text
-    # the page keeps the table of a study that did not run
-    assert "old real_data" in text
-    assert "old parsimony" not in text
-    assert text.count("| matched |") == 1
-
-
-def test_fills_the_tables_of_repeats_and_of_published_fits(results_folder: Path) -> None:
+def results_of_repeats() -> list[dict[str, Any]]:
     draws = {"n_parameters": [11, 14, 17], "repeat": [1.0, 2.0, 3.0], "sample": [4.0, 5.0, 6.0]}
     curve = [0.0, 1.0]
     row = {
@@ -93,60 +76,97 @@ def test_fills_the_tables_of_repeats_and_of_published_fits(results_folder: Path)
         "published_kPa": {"Yeoh_o3": 0.7, "Ogden_o1": 2.0},
         "curves": {"position": [0.0, 0.02], "half_width": curve, "A": [curve], "B": [curve]},
     }
-    write_results(results_folder, "repeats", [row])
-    page = results_folder / "identification.md"
-    names = ("compare_methods", "filters", "parsimony", "repeats", "published")
-    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
-    main([str(results_folder), "--to", str(results_folder)])
-    text = page.read_text(encoding="utf-8")
+    return [row]
+
+
+def results_of_several_inputs() -> list[dict[str, Any]]:
+    return [
+        result_row(PROBLEM, "palpate", 2e-3, 71),
+        result_row(PROBLEM, "HistGradientBoosting", 3e-2, 900),
+        result_row(PROBLEM, "Nystrom + Ridge", 4e-3, 1000),
+        result_row(PROBLEM, "Gaussian process", 1e-3, 2000),
+    ]
+
+
+def results_of_measured_objects() -> dict[str, list[dict[str, Any]]]:
+    return {
+        "domes": [measured_row(0.015, floor=0.009, share_at_turn=0.8), measured_row(0.03)],
+        "domes_h_of_any_sign": [measured_row(0.011)],
+        "domes_force_25_ms_earlier": [measured_row(0.006)],
+        "springs": [measured_row(0.009)],
+    }
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns a folder with the figures and the page of all studies except that of moving objects."""
+    folder = tmp_path_factory.mktemp("results")
+    write_results(folder, "compare_methods", results_of_methods())
+    write_results(folder, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
+    write_results(folder, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
+    write_results(folder, "repeats", results_of_repeats())
+    write_results(folder, "several_inputs", results_of_several_inputs())
+    write_results(folder, "real_data", results_of_measured_objects())
+    names = (
+        "compare_methods",
+        "filters",
+        "parsimony",
+        "repeats",
+        "published",
+        "several_inputs",
+        "real_data",
+        "crossing",
+        "dynamic",
+    )
+    tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
+    # a new table of the page is empty until its study has run
+    (folder / "identification.md").write_text(tables.replace("old filters\n", ""))
+    main([str(folder), "--to", str(folder)])
+    return folder
+
+
+def page_of(folder: Path) -> str:
+    return (folder / "identification.md").read_text(encoding="utf-8")
+
+
+def has_figure(folder: Path, name: str) -> bool:
+    return (folder / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
+
+
+def test_draws_figures_and_fills_tables_of_the_page(filled: Path) -> None:
+    for name in ("parameters", "time", "filters"):
+        assert has_figure(filled, name)
+    text = page_of(filled)
+    assert "| P1, palpate | 3.00e-04 (1.50e-04 to 6.00e-04) | 6 (5 to 7) | 20 (17 to 23) |" in text
+    assert "| P1, splines | 5.00e-04 (2.50e-04 to 1.00e-03) |  | 44 (41 to 47) | 0.25 |" in text
+    assert "MARS" not in text
+    assert "| no wavelet | 99 | 100 |" in text
+    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
+    assert "of up to 12 draws" in text
+    # the page keeps the table of a study that did not run
+    assert "old dynamic" in text
+    assert "old parsimony" not in text
+    assert text.count("| matched |") == 1
+
+
+def test_fills_the_tables_of_repeats_and_of_published_fits(filled: Path) -> None:
+    text = page_of(filled)
     assert f"| soft, {SEVERAL} | 14 (11 to 17) | 2.00 (1.00 to 3.00) | 5.00 (4.00 to 6.00) | 96.7 % |" in text
     assert "| soft, spline | 14 (11 to 17) | 2.00 (1.00 to 3.00) | 5.00 (4.00 to 6.00) |  | 1 |" in text
     assert "| soft | 0.50 | 1.00 | Yeoh 3 0.70, Ogden 1 2.00 | 1 of 2 | Yeoh 3 |" in text
-    assert (results_folder / "figures" / "identification-repeats.png").read_bytes().startswith(PNG)
+    assert has_figure(filled, "repeats")
 
 
-def test_fills_the_table_of_several_inputs(results_folder: Path) -> None:
-    problem = "contact, 6 inputs, 20000 rows"
-    rows = [
-        result_row(problem, "palpate", 2e-3, 71),
-        result_row(problem, "HistGradientBoosting", 3e-2, 900),
-        result_row(problem, "Nystrom + Ridge", 4e-3, 1000),
-        result_row(problem, "Gaussian process", 1e-3, 2000),
-    ]
-    write_results(results_folder, "several_inputs", rows)
-    page = results_folder / "identification.md"
-    names = ("compare_methods", "filters", "parsimony", "several_inputs")
-    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
-    main([str(results_folder), "--to", str(results_folder)])
-    (line,) = [each for each in page.read_text(encoding="utf-8").splitlines() if problem in each]
+def test_fills_the_table_of_several_inputs(filled: Path) -> None:
+    (line,) = [each for each in page_of(filled).splitlines() if PROBLEM in each]
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[:2] == [f"{problem} (12 draws)", "0.2 (0.1 to 0.4)"]
+    assert cells[:2] == [f"{PROBLEM} (12 draws)", "0.2 (0.1 to 0.4)"]
     assert cells[4:7] == ["0.1 (0.05 to 0.2)", "71", "0.75"]
-    figure = results_folder / "figures" / "identification-several.png"
-    assert figure.read_bytes().startswith(PNG)
+    assert has_figure(filled, "several")
 
 
-def measured_row(nrmse: float, **fields: Any) -> dict[str, Any]:
-    splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
-    row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}
-    spline_results = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
-    return {**row, **spline_results, "baselines": {"splines": splines}, **fields}
-
-
-def test_fills_the_tables_of_measured_objects_and_of_crossing_strokes(results_folder: Path) -> None:
-    dome_rows = [measured_row(0.015, floor=0.009, share_at_turn=0.8), measured_row(0.03)]
-    variants = {
-        "domes_h_of_any_sign": [measured_row(0.011)],
-        "domes_force_25_ms_earlier": [measured_row(0.006)],
-    }
-    write_results(
-        results_folder, "real_data", {"domes": dome_rows, **variants, "springs": [measured_row(0.009)]}
-    )
-    page = results_folder / "identification.md"
-    names = ("compare_methods", "filters", "parsimony", "real_data", "crossing")
-    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
-    main([str(results_folder), "--to", str(results_folder)])
-    text = page.read_text(encoding="utf-8")
+def test_fills_the_tables_of_measured_objects_and_of_crossing_strokes(filled: Path) -> None:
+    text = page_of(filled)
     assert "| domes (2 files), palpate | 0.0225 | 100 | 1 | 3.00 (2 above 1.3) | 1.50 (1 above 1.3) |" in text
     assert "| springs (1 files), palpate | 0.0090 | 100 | 1 | 0.90 | 0.45 |" in text
     assert "| dome | 0.0150 | 0.0110 | 0.0100 | 0.0200 | 0.0090 | 80 % | 0.0060 | 0.0100 |" in text

@@ -2,6 +2,7 @@
 """Tests the changes of a recording that add no information, and that some of them give the same model."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -55,10 +56,15 @@ def readings(recordings: Recording | list[Recording]) -> set[tuple[float, float]
     return {pair for part in parts for pair in zip(part.position.tolist(), part.force.tolist(), strict=True)}
 
 
+@cache
+def readings_of(draw: int) -> set[tuple[float, float]]:
+    return readings(drawn_to_change(draw)[0].recording())
+
+
 @pytest.mark.parametrize("change", [*ADDING, *KEEPING, *THINNING], ids=lambda change: change.__name__)
 def test_a_change_keeps_the_readings_of_the_strokes(change: Callable) -> None:
     for draw in range(len(OBJECTS)):
-        before = readings(drawn_to_change(draw)[0].recording())
+        before = readings_of(draw)
         changed = change(*drawn_to_change(draw))
         if changed is None:
             continue

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.identification.ordinary import Truth, judged, main, measure, report, report_of, resolvable, silent
+from bench.identification.ordinary import Truth, judged, main, report, report_of, resolvable, silent
 from bench.identification.ordinary_objects import OBJECTS, Array, Object
 from bench.identification.ordinary_recordings import OPERATORS, Rows, drawn, measured, strokes
 
@@ -183,7 +183,7 @@ def test_the_bench_judges_a_draw_and_writes_its_results(
     )
     main()
     results = json.loads(file.read_text())["results"]
-    assert results["draws"][0]["object"] == measure(5)["object"] == "spring with wall"
+    assert results["draws"][0]["object"] == drawn(5)[1].object.name == "spring with wall"
     table = capsys.readouterr().out
     assert "error over reference" in table
     assert "| variable rate | 1 | 0 |" in table

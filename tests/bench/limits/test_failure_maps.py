@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bench import studies
 from bench.limits import failure_maps
 from bench.limits.failure_maps import map_table, write
 from bench.studies import ROOT, fill_tables
@@ -44,8 +45,8 @@ def test_writes_figures_numbers_and_tables(tmp_path: Path) -> None:
 def test_refuses_a_page_without_marks(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text("nothing to fill\n")
-    with pytest.raises(SystemExit, match="'<!-- pole -->'"):
-        write(program_output("pole"), tmp_path, 1.0)
+    with pytest.raises(SystemExit, match="'<!-- guards -->'"):
+        write(program_output(), tmp_path, 1.0)
     assert page.read_text() == "nothing to fill\n"
 
 
@@ -72,12 +73,20 @@ def test_fills_empty_tables(tmp_path: Path) -> None:
     assert page.read_text() == "<!-- one -->\n1\n<!-- end -->\nbetween\n<!-- two -->\n2\n<!-- end -->\n"
 
 
-def test_missing_program_names_its_build_target(tmp_path: Path) -> None:
+def test_missing_program_names_its_build_target(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "ROOT", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["failure_maps.py", "--to", str(tmp_path)])
+    with pytest.raises(SystemExit, match="--target failure_maps"):
+        failure_maps.main()
+
+
+@pytest.mark.full
+def test_the_script_names_the_build_target_of_a_missing_program(tmp_path: Path) -> None:
     script = tmp_path / "bench" / "limits" / "failure_maps.py"
     script.parent.mkdir(parents=True)
     script.write_text(Path(failure_maps.__file__).read_text(encoding="utf-8"), encoding="utf-8")
-    studies = ROOT / "bench" / "studies.py"
-    (tmp_path / "bench" / studies.name).write_text(studies.read_text(encoding="utf-8"), encoding="utf-8")
+    functions = Path(studies.__file__)
+    (tmp_path / "bench" / functions.name).write_text(functions.read_text(encoding="utf-8"), encoding="utf-8")
     command = [sys.executable, str(script), "--to", str(tmp_path)]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)
     assert completed.returncode == 1

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from bench.plans import held_lines
 
+from conftest import sampled
 from palpate._core.stability import stiffest_line_wall
 
 ROOT = Path(__file__).parents[3]
@@ -22,10 +23,11 @@ def test_page_shows_the_stored_numbers() -> None:
     assert all(table in text for table in tables.values())
 
 
-def test_the_stored_walls_follow_from_the_profiles() -> None:
+@pytest.mark.parametrize("which", sampled(["damiao-4310", "hid-wheel"], "hid-wheel"))
+def test_the_stored_walls_follow_from_the_profiles(which: str) -> None:
     content = json.loads(NUMBERS.read_text(encoding="utf-8"))
     stored = {row["device"]: row for row in content["walls"]}
-    name, device = next(each for each in held_lines.devices() if each[0] == "damiao-4310")
+    name, device = next(each for each in held_lines.devices() if each[0] == which)
     width, speed = held_lines.WALLS[0]
     stiffest = stiffest_line_wall(device, width, speed * device.period_s)
     assert stiffest == pytest.approx(stored[name]["by_width"]["0.01 rad, 3 rad/s"], rel=1e-3)
