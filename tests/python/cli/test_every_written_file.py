@@ -68,8 +68,11 @@ RECORDING = {"simulate", "render", "record", "export --table", "export --mcap", 
 WITH_FORCE = {"simulate", "render", "record", "palpate-control"}
 """Commands with the option --force, which replaces a recording"""
 
-SAMPLE = {"plan", "export --mcap", "palpate-control"}
+SAMPLE = {"export --c", "export --mcap", "palpate-control"}
 """Commands for `make test`: one for each way of writing. `make test-full` takes all."""
+
+SAMPLE_OF_CALLS = {"plan", "export --mcap", "palpate-control"}
+"""Commands for `make test` of every call: the plan writes two files, of which one is a figure."""
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 
@@ -241,7 +244,7 @@ def test_the_table_contains_every_verb_and_every_option_that_writes_a_file() -> 
 
 
 @pytest.mark.parametrize("before", ["absent", "old"])
-@every_case
+@cases(SAMPLE_OF_CALLS)
 def test_at_every_call_each_file_is_absent_old_or_complete(
     programs: Programs, name: str, before: str, folder: Path, tmp_path: Path
 ) -> None:
@@ -340,7 +343,7 @@ def test_a_failed_call_is_reported(programs: Programs, name: str, folder: Path, 
             assert not leftovers(work), f"{call}: {leftovers(work)}"
 
 
-@every_quick_case
+@cases(SAMPLE | SAMPLE_OF_CALLS, sorted(CASES.keys() - SLOW))
 def test_a_full_disk_is_reported_and_keeps_old_files(programs: Programs, name: str, folder: Path) -> None:
     inputs = files_in(folder)
     if name in WITH_FORCE or name not in RECORDING:
