@@ -105,7 +105,7 @@ def test_header_gives_the_bits_of_the_tested_arithmetic(kind: str, precision: st
 
 
 @pytest.mark.skipif(" fma " not in CPU, reason="needs a processor with contracted products and sums")
-@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("precision", sampled(["single", "double"], "single"))
 def test_contracted_header_is_within_its_proved_bounds(precision: str, tmp_path: Path) -> None:
     model, tables = tables_of("position", precision=precision)
     header_of(model, tables, tmp_path)
@@ -118,7 +118,7 @@ def test_contracted_header_is_within_its_proved_bounds(precision: str, tmp_path:
     assert np.abs(contracted[:, 2] - model.slope(x)).max() <= tables.slope_error
 
 
-@pytest.mark.parametrize("kind", sampled(KINDS, "hysteresis", "massless", "periodic_predicted_hysteresis"))
+@pytest.mark.parametrize("kind", sampled(KINDS, "massless", "periodic_predicted_hysteresis"))
 def test_any_position_has_defined_behaviour(kind: str, tmp_path: Path) -> None:
     model, tables = tables_of(kind, precision="double")
     header_of(model, tables, tmp_path)
@@ -128,7 +128,7 @@ def test_any_position_has_defined_behaviour(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "precision"),
-    sampled(EVERY_CASE, ("predicted_hysteresis", "single"), ("massless", "double"), ("periodic", "single")),
+    sampled(EVERY_CASE, ("predicted_hysteresis", "single"), ("massless", "double")),
 )
 def test_header_compiles_without_warnings_as_c99_and_cpp11(kind: str, precision: str, tmp_path: Path) -> None:
     header = header_of(*tables_of(kind, precision=precision), tmp_path)
@@ -255,7 +255,7 @@ def test_names_of_model_file_and_device_cannot_change_the_program(seed: int, tmp
         flags = [*flags_of(folder / "knob.h"), *defined]
         hashes |= {
             run_here(EXPORTED, folder, flags, compiler=compiler, standard=COMPILERS[compiler])
-            for compiler in ("gcc", "g++")
+            for compiler in (("gcc", "g++") if shown == name or SCALE > 1 else ("gcc",))
         }
     assert len(hashes) == 1
 
@@ -272,9 +272,7 @@ def test_words_of_the_template_are_kept_in_names(tmp_path: Path) -> None:
     assert f" on {name} at 1000 Hz" in certificate
 
 
-@pytest.mark.parametrize(
-    "name", sampled(["TABLE", "NAME", "PROFILE", "DEVICE", "STRUCTURE"], "TABLE", "STRUCTURE")
-)
+@pytest.mark.parametrize("name", sampled(["TABLE", "NAME", "PROFILE", "DEVICE", "STRUCTURE"], "TABLE"))
 def test_a_word_of_the_template_can_be_the_name_of_a_model(name: str, tmp_path: Path) -> None:
     model, tables = tables_of("predicted_hysteresis")
     header = header_of(model, tables, tmp_path, name)

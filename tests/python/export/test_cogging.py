@@ -59,12 +59,18 @@ def exported(tmp_path: Path, capsys: pytest.CaptureFixture[str], model: Model, *
     return output.read_text(encoding="utf-8"), json.loads(capsys.readouterr().out)
 
 
-def moteus_current(text: str, turns: float) -> float:
-    """Returns the current [A] that a moteus adds at an angle in revolutions, from 0 to 1."""
+@cache
+def moteus_table(text: str) -> tuple[list[int], np.float32]:
+    """Returns the entries and the scale that the commands for a moteus set."""
     settings = dict(re.findall(r"^conf set motor\.cogging_dq_(\S+) (\S+)$", text, re.MULTILINE))
     table = [int(settings[f"comp.{i}"]) for i in range(1024)]
     assert all(-127 <= entry <= 127 for entry in table)
-    scale = np.float32(settings["scale"])
+    return table, np.float32(settings["scale"])
+
+
+def moteus_current(text: str, turns: float) -> float:
+    """Returns the current [A] that a moteus adds at an angle in revolutions, from 0 to 1."""
+    table, scale = moteus_table(text)
     left = min(len(table) - 1, int(len(table) * turns))
     right = (left + 1) % len(table)
     fraction = (turns - left / len(table)) * len(table)

@@ -10,7 +10,7 @@ from palpate._core.rendering import Scheme, default_play_radius
 
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
-FEW = 3
+FEW = 2
 """Number of recordings at scale 1: the smallest ones that give a model."""
 
 

@@ -275,12 +275,12 @@ def test_a_falling_object_with_mass_is_stepped_energy_consistently_because_of_th
 
 def test_the_coupling_is_softer_on_a_late_device_and_still_certified() -> None:
     stiffness = []
-    for delay_s in (0.0, 0.5e-3, 1e-3, 2e-3):
+    for delay_s in (0.0, 0.5e-3, 2e-3):
         chosen = plan(model_by_hand(), DeviceProfile(id="late", encoder_step=0.0, delay_s=delay_s), mass=1e-3)
         assert chosen.structure == "implicit"
         stiffness.append(chosen.scheme.coupling_stiffness)
     assert stiffness == sorted(stiffness, reverse=True)
-    assert stiffness[3] < 0.3 * stiffness[0]
+    assert stiffness[-1] < 0.3 * stiffness[0]
 
 
 def test_a_plan_is_stored_and_holds_for_its_device_alone(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ def test_a_clean_recording_has_no_finding(name: str) -> None:
 @pytest.mark.parametrize("folder", ["keyswitches", "rubber_domes", "switch_springs"])
 def test_clean_measured_files_have_no_finding(data: Path, folder: str) -> None:
     found = {}
-    for path in sorted((data / folder).glob("*.csv"))[:: 1 if SCALE > 1 else 3]:
+    for path in sorted((data / folder).glob("*.csv"))[:: 1 if SCALE > 1 else 6]:
         if "latch" not in path.name and "lock" not in path.name:
             found[path.name] = quality_findings(palpate.read_recording(path))
     assert not any(found.values()), found
@@ -128,6 +129,11 @@ def test_the_ranges_of_a_microscope_recording_are_plausible() -> None:
     assert sentences(Rows(x, 0.01 * x, None, None, {"position": "m", "force": "N"})) == []
 
 
+@cache
+def three_agree() -> bool:
+    return sentences(*(rows_of("P2", draw) for draw in range(3))) == []
+
+
 @pytest.mark.parametrize(
     "ratio",
     sampled([*UNIT_RATIOS, *(1.0 / each for each in UNIT_RATIOS)], *UNIT_RATIOS, 1.0 / max(UNIT_RATIOS)),
@@ -137,7 +143,7 @@ def test_a_recording_in_another_unit_than_the_others_is_reported_with_the_ratio(
     ratio: float, role: str
 ) -> None:
     first, second, third = (rows_of("P2", draw) for draw in range(3))
-    assert sentences(first, second, third) == []
+    assert three_agree()
     wrong = replace(second, x=second.x / ratio) if role == "position" else replace(second, f=second.f / ratio)
     recordings = [each.recording() for each in (first, wrong, third)]
     (finding,) = [each for each in findings_of(recordings) if "agrees with" in each.sentence]
@@ -153,9 +159,10 @@ def test_recordings_of_two_objects_are_reported() -> None:
     assert sentence.endswith("identify them separately")
 
 
-@pytest.mark.parametrize("name", SYNTHETIC)
+@pytest.mark.parametrize("name", sampled(SYNTHETIC, "P2", "loop", "sample"))
 def test_two_objects_in_one_file_are_not_called_good(name: str) -> None:
     rows = rows_of(name)
+    rows = rows.take(np.arange(0, len(rows), 2))
     t = None if rows.t is None else np.r_[rows.t, rows.t + rows.t[-1] + rows.t[1]]
     d = None if rows.d is None else np.r_[rows.d, rows.d]
     both = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, 2.0 * rows.f], t, d, rows.units)
@@ -214,6 +221,7 @@ def test_a_clipped_file_gets_the_verdict_usable_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows = rows_of("P1")
+    rows = rows.take(np.arange(0, len(rows), 4))
     path = replace(rows, f=np.minimum(rows.f, 5.0)).recording().write(tmp_path / "press.csv")
     assert main(["identify", str(path), "-o", str(tmp_path / "press.json"), "--json"]) == 0
     verdict = json.loads(capsys.readouterr().out)["verdict"]
@@ -244,7 +252,7 @@ def test_a_friction_of_the_wrong_sign_is_not_advised_to_be_late() -> None:
 
 def magnet(sign: float, seed: int) -> palpate.Recording:
     """Returns a slow press and release by hand on a magnet, whose force begins nowhere."""
-    x = 0.02 * 0.5 * (1.0 - np.cos(np.linspace(0.0, 4.0 * np.pi, 2000)))
+    x = 0.02 * 0.5 * (1.0 - np.cos(np.linspace(0.0, 4.0 * np.pi, 1000)))
     f = sign * 5.0 * (0.3 / (1.3 - x / 0.02)) ** 3
     return palpate.Recording.from_arrays(x, f + np.random.default_rng(seed).normal(0.0, 0.005, len(x)))
 

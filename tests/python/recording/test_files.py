@@ -177,7 +177,7 @@ def test_a_broken_link_counts_as_an_existing_file(tmp_path: Path) -> None:
 def test_without_replace_a_recording_is_not_overwritten(tmp_path: Path) -> None:
     from palpate.recording.sample import sample_recording
 
-    recording = sample_recording(seed=1)
+    recording = sample_recording(seed=1, duration_s=1.0)
     path = tmp_path / "a.csv"
     recording.write(path, replace=False)
     with pytest.raises(InputError, match="exists already"):

@@ -2,7 +2,9 @@
 """Files of many instruments and headers are read, or refused with printed options that read them."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -17,6 +19,13 @@ READ_WITHOUT_OPTIONS = len(INSTRUMENTS) - 12
 """Least number of instruments whose files need no option."""
 
 
+@cache
+def file_of(instrument: Callable[[instruments.Press], str]) -> tuple[Recording, int]:
+    """Returns the recording in a file of an instrument and the number of refusals; the tests only read it."""
+    with TemporaryDirectory() as folder:
+        return read_with_printed_options(instruments.write(instrument, Path(folder)))
+
+
 def read_with_printed_options(path: Path) -> tuple[Recording, int]:
     """Reads a file, at the first refusal with the printed options; returns the number of refusals."""
     try:
@@ -27,9 +36,9 @@ def read_with_printed_options(path: Path) -> tuple[Recording, int]:
 
 @pytest.mark.parametrize("instrument", INSTRUMENTS, ids=lambda each: each.__name__)
 def test_a_file_of_an_instrument_is_read_directly_or_with_the_printed_options(
-    tmp_path: Path, instrument: Callable[[instruments.Press], str]
+    instrument: Callable[[instruments.Press], str],
 ) -> None:
-    recording, _ = read_with_printed_options(instruments.write(instrument, tmp_path))
+    recording, _ = file_of(instrument)
     press = instruments.press()
     kept = np.ones(len(press.time_s), dtype=bool)
     if instrument is instruments.unread_cells:
@@ -48,13 +57,9 @@ def test_a_file_of_an_instrument_is_read_directly_or_with_the_printed_options(
         np.testing.assert_allclose(recording.time - recording.time[0], press.time_s[kept], atol=1e-6)
 
 
-def test_most_instruments_need_no_option(tmp_path: Path) -> None:
-    refused = [each.__name__ for each in INSTRUMENTS if needs_options(instruments.write(each, tmp_path))]
+def test_most_instruments_need_no_option() -> None:
+    refused = [each.__name__ for each in INSTRUMENTS if file_of(each)[1] > 0]
     assert len(refused) <= len(INSTRUMENTS) - READ_WITHOUT_OPTIONS, refused
-
-
-def needs_options(path: Path) -> bool:
-    return read_with_printed_options(path)[1] > 0
 
 
 # Header: the cells of each column (x position, f force, t time, k row number, c a constant, w work, v half

@@ -5,6 +5,7 @@ import os
 import random
 import re
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,10 @@ def named_line(read: Callable[[Path], Any], path: Path) -> int:
     return int(found[1])
 
 
-@pytest.mark.parametrize("read", [read_recording, in_parts])
-@pytest.mark.parametrize("ending", ["\n", "\r\n"], ids=["LF", "CR LF"])
+@pytest.mark.parametrize(
+    ("read", "ending"),
+    sampled(product((read_recording, in_parts), ("\n", "\r\n")), (read_recording, "\r\n"), (in_parts, "\n")),
+)
 @pytest.mark.parametrize("between", sampled(BETWEEN, "nothing", "quoted"))
 @pytest.mark.parametrize("header", sampled(HEADER, "names", "units after a blank line"))
 def test_the_first_line_of_a_defective_row_is_named(

@@ -91,7 +91,7 @@ def test_a_file_of_another_program_is_read_and_its_dialect_reported(
     assert read_recording(recording.write(tmp_path / "again.csv")).metadata == metadata
 
 
-@pytest.mark.parametrize("row", [3, 200_000], ids=["at the start", "far below"])
+@pytest.mark.parametrize("row", [3, 100_000], ids=["at the start", "far below"])
 def test_a_byte_outside_utf_8_is_read_as_latin_1_or_refused_with_a_command(tmp_path: Path, row: int) -> None:
     lines = [f"{0.5 * k},{10 * k},ok".encode() for k in range(row + 20)]
     lines[row] = f"{0.5 * row},{10 * row},weiß".encode("latin-1")

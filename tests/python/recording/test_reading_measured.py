@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every measured file is read without options, or with the options that the error message suggests."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from conftest import measured_data, sampled
-from palpate import InputError, read_recording
+from palpate import InputError, Recording, read_recording
 from small_files import options_in, refusal
 
 # Sets whose files are read without an option. A file of any other set is read, or its refusal names options
@@ -88,9 +89,10 @@ MOST_REFUSALS = 3
 """Largest number of times that one file is refused: for its header, then for rows that cannot be used."""
 
 
-def every_sixth(files: list[str]) -> list[Any]:
-    """Returns the files; `make test` reads every sixth one."""
-    return sampled(files, *files[::6])
+def some_of_each_set(files: list[str]) -> list[Any]:
+    """Returns the files; `make test` reads the first one of each set, and every twelfth one."""
+    first_of_each_set = {file.split("/")[0]: file for file in reversed(files)}
+    return sampled(files, *first_of_each_set.values(), *files[::12])
 
 
 def measured_files() -> list[str]:
@@ -105,13 +107,20 @@ def options_of(file: str) -> dict[str, object]:
     return OPTIONS.get(file) or OPTIONS[file.split("/")[0]]
 
 
-@pytest.mark.parametrize("file", every_sixth([file for file in measured_files() if file != TEXT_TABLE]))
+@cache
+def read_directly(path: Path) -> Recording:
+    """Returns the recording in a file, which the tests only read."""
+    return read_recording(path)
+
+
+@pytest.mark.parametrize("file", some_of_each_set([file for file in measured_files() if file != TEXT_TABLE]))
 def test_a_measured_file_is_read_directly_or_with_the_cures_of_its_refusals(data: Path, file: str) -> None:
     options: dict[str, object] = {}
     recording, refusals = None, 0
     while recording is None and refusals < MOST_REFUSALS:
         try:
-            recording = read_recording(data / file, **options)  # type: ignore[arg-type]
+            path = data / file
+            recording = read_recording(path, **options) if options else read_directly(path)  # type: ignore[arg-type]
         except InputError as refused:
             if str(refused).endswith("A recording needs two columns of numbers, a position and a force"):
                 assert file.split("/")[0] in ("silverbox", "sysid_benchmarks")  # voltages and levels
@@ -124,10 +133,11 @@ def test_a_measured_file_is_read_directly_or_with_the_cures_of_its_refusals(data
 
 
 @pytest.mark.parametrize(
-    "file", every_sixth([file for file in measured_files() if file.split("/")[0] in READ_WITHOUT_OPTIONS])
+    "file",
+    some_of_each_set([file for file in measured_files() if file.split("/")[0] in READ_WITHOUT_OPTIONS]),
 )
 def test_every_row_of_a_measured_file_is_read_in_si(data: Path, file: str) -> None:
-    recording = read_recording(data / file)
+    recording = read_directly(data / file)
     lines = (data / file).read_text(encoding="utf-8").splitlines()
     header = next(line for line in lines if "," in line)
     assert len(recording) == len(lines) - lines.index(header) - 1
@@ -148,8 +158,15 @@ def test_the_first_note_of_a_measured_file_reports_columns_and_dialect(data: Pat
     assert recording.metadata["Cylinder Diameter"] == "50mm"
 
 
+WITH_OPTIONS = [file for file in measured_files() if {file, file.split("/")[0]} & {*OPTIONS}]
+
+
 @pytest.mark.parametrize(
-    "file", [file for file in measured_files() if {file, file.split("/")[0]} & {*OPTIONS}]
+    "file",
+    sampled(
+        WITH_OPTIONS,
+        *{file if file in OPTIONS else file.split("/")[0]: file for file in WITH_OPTIONS}.values(),
+    ),
 )
 def test_a_measured_file_is_read_with_stated_columns(data: Path, file: str) -> None:
     assert len(read_recording(data / file, **options_of(file))) >= 200  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors, whiteness and perception by definition or law; comparison of two models."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,7 @@ def test_a_stiffness_needs_motion_and_rows() -> None:
     assert share_within_stiffness_jnd(few, few, few) is None
 
 
+@cache
 def spring(stiffness: float, reach: float = 1.0, loss: float = 0.0) -> Model:
     x = np.concatenate([np.linspace(0, reach, 100), np.linspace(reach, 0, 100)])
     direction = np.repeat([1, -1], 100)

@@ -2,6 +2,7 @@
 """A flight record of a model with hysteresis is verified with the play operator of the rendering."""
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from palpate.verification.prediction import flight_of
 UNITS = {"position": "m", "force": "N"}
 
 
+@cache
 def keyswitch() -> Model:
     """Returns a switch that is pressed and released: the file states directions, and no play radius."""
     x = np.concatenate([np.linspace(0.0, 4e-3, 400), np.linspace(4e-3, 0.0, 400)])
@@ -35,7 +37,7 @@ def test_a_flight_record_of_a_model_with_hysteresis_is_verified(
     assert model.play_radius is None
     model.save(tmp_path / "k.json")
     out = tmp_path / "again.csv"
-    words = ["--duration-s", 4, "--record", out, "--structure", structure, "--predict", predict]
+    words = ["--duration-s", 2, "--record", out, "--structure", structure, "--predict", predict]
     answer = control(tmp_path / "k.json", *words)
     assert answer.returncode == 0, answer.stderr
     assert main(["verify", str(tmp_path / "k.json"), str(out), "--json"]) == 0

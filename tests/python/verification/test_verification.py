@@ -3,6 +3,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -364,9 +365,19 @@ def test_a_copied_file_is_not_fresh(tmp_path: Path) -> None:
     assert not verify(model_of(read_recording(path).source), read_recording(copy)).fresh
 
 
+@cache
+def of_a_sample() -> Model:
+    return identify(sample_recording(1, 2.0))
+
+
+@cache
+def without_waits() -> Model:
+    return identify(with_waits(0))
+
+
 def test_a_frame_of_a_verification_is_read_back_as_its_compared_rows() -> None:
     recording = sample_recording(2, 2.0)
-    found = verify(identify(sample_recording(1, 5.0)), recording)
+    found = verify(of_a_sample(), recording)
     frame = found.to_frame()
     assert list(frame.columns) == ["time_s", "position_rad", "force_Nm", "modelled_force_Nm", "residual_Nm"]
     for table in (frame, pd.DataFrame(dict(frame))):  # with and without the roles in attrs
@@ -382,7 +393,7 @@ def test_a_frame_of_a_verification_is_read_back_as_its_compared_rows() -> None:
 
 def test_plot_of_a_verification_draws_forces_or_residuals() -> None:
     recording = sample_recording(2, 2.0)
-    found = verify(identify(sample_recording(1, 5.0)), recording)
+    found = verify(of_a_sample(), recording)
     forces, residuals = Figure().subplots(2)
     assert plot(found, forces) is forces
     plot(found, residuals, residual=True)
@@ -404,7 +415,7 @@ def with_waits(rows: int) -> Recording:
 
 @pytest.mark.parametrize("rows", [30, 300, 5000])
 def test_rows_that_wait_are_not_compared(rows: int) -> None:
-    model = identify(with_waits(0))
+    model = without_waits()
     without, found = verify(model, with_waits(0)), verify(model, with_waits(rows))
     assert found.n == pytest.approx(without.n, abs=4)
     assert found.nrmse == pytest.approx(without.nrmse, rel=0.05)
@@ -429,7 +440,7 @@ def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
     recording = with_waits(300)
     hold = np.zeros(len(recording))
     hold[720:980] = 1.0
-    assert verify(identify(with_waits(0)), replace(recording, direction=hold.astype(np.int8))).n == 260
+    assert verify(without_waits(), replace(recording, direction=hold.astype(np.int8))).n == 260
 
 
 def test_waits_of_a_model_with_memory_are_compared() -> None:
