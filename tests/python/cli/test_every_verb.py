@@ -83,9 +83,12 @@ def test_unwritable_output_exits_with_code_1_without_traceback(verb: str, reason
     assert not list(folder.glob(".*"))
 
 
-@pytest.mark.parametrize("redirection", sampled(["2>&-", "2>/dev/full"], "2>/dev/full"))
-def test_unwritable_messages_change_no_result(redirection: str, folder: Path) -> None:
-    completed = run(VERBS["identify"], folder, redirection)
+@pytest.mark.parametrize(
+    ("verb", "redirection"),
+    sampled(product(("identify", "plan"), ("2>&-", "2>/dev/full")), ("plan", "2>/dev/full")),
+)
+def test_unwritable_messages_change_no_result(verb: str, redirection: str, folder: Path) -> None:
+    completed = run(VERBS[verb], folder, redirection)
     assert completed.returncode == 0
     assert completed.stdout.startswith("verdict: good\n")
     load_model(folder / "out.json")
