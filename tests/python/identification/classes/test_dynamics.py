@@ -2,12 +2,13 @@
 """Velocity, mass, damping and hysteresis are identified only if they are present."""
 
 import os
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from palpate import Recording, identify, read_recording, verify
+from palpate import Model, Recording, identify, read_recording, verify
 from palpate._core.model import play
 from palpate.identification.classes.dynamics import Dynamics
 from palpate.recording import sample_force
@@ -53,6 +54,11 @@ def moved(
     )
 
 
+@cache
+def identified(seed: int, *, damping: float = 0.0, hysteresis: float = 0.0) -> Model:
+    return identify(moved(seed, damping=damping, hysteresis=hysteresis))
+
+
 def test_a_pull_that_the_force_of_a_mass_hides_is_part_of_the_model() -> None:
     """At the lowest positions of a fast motion the mass pushes more than the object pulls."""
     time = 1e-3 * np.arange(5000.0)
@@ -95,13 +101,13 @@ def test_velocity_and_hysteresis_are_accepted_only_if_present(
 ) -> None:
     misjudged = 0
     for draw in range(DRAWS):
-        model = identify(moved(draw, **there))
+        model = identified(draw, **there)
         misjudged += (model.fit.model_class, model.kind) != (model_class, kind)
     assert misjudged <= MOST_MISJUDGED
 
 
 def test_decision_on_each_term_reports_its_gain() -> None:
-    decisions = identify(moved(1, damping=0.03)).notes["model_selection"]
+    decisions = identified(0, damping=0.03).notes["model_selection"]
     (accepted,) = (line for line in decisions if line.startswith("damping: accepted"))
     assert "lowers the squared error on held-out sections by " in accepted
     assert ", lowers BIC by " in accepted

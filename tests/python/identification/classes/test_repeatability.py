@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Identification from several recordings: size of the network, band, and the check of the band."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from palpate import InputError, Recording, identify, verify
 from palpate.identification.classes.repeatability import NO_BAND
 
 
-def recordings(n: int, *, spread: float = 0.02, seed: int = 0) -> list[Recording]:
+def recordings(n: int, *, spread: float = 0.02, seed: int = 0, rows: int = 300) -> list[Recording]:
     """Returns recordings of one stiffening object, each with another stiffness, shape and noise."""
     random = np.random.default_rng(seed)
     made = []
     for _ in range(n):
-        x = np.sort(random.uniform(0.0, 0.01, 600))
+        x = np.sort(random.uniform(0.0, 0.01, rows))
         u = x / 0.01
         force = 5.0 * u + 20.0 * u**5 + np.exp(-(((u - 0.4) / 0.02) ** 2)) * 0.05
         stiffness, place = random.normal(size=2)
@@ -26,6 +27,12 @@ def recordings(n: int, *, spread: float = 0.02, seed: int = 0) -> list[Recording
         press = np.ones(len(x))
         made.append(Recording.from_arrays(x, force, direction=press, units={"position": "m", "force": "N"}))
     return made
+
+
+@cache
+def of_six_recordings() -> palpate.Model:
+    """Returns the model of the first six recordings."""
+    return identify(recordings(6))
 
 
 def stiffer(recording: Recording, factor: float) -> Recording:
@@ -39,7 +46,7 @@ def stiffer(recording: Recording, factor: float) -> Recording:
 
 def test_growth_stops_where_the_model_is_as_good_as_the_object_repeats() -> None:
     seen, unseen = recordings(6), recordings(20, seed=1)
-    model = identify(seen)
+    model = of_six_recordings()
     finer = identify(
         np.concatenate([each.position for each in seen]),
         np.concatenate([each.force for each in seen]),
@@ -55,7 +62,7 @@ def test_growth_stops_where_the_model_is_as_good_as_the_object_repeats() -> None
 def test_the_check_estimates_error_and_coverage_of_unseen_recordings() -> None:
     found = []
     for seed in range(4 if SCALE == 1 else 10):
-        seen, unseen = np.split(np.array(recordings(16, seed=seed), dtype=object), 2)
+        seen, unseen = np.split(np.array(recordings(16, seed=seed, rows=600), dtype=object), 2)
         model = identify(list(seen))
         assert model.band is not None
         verified = [verify(model, each) for each in unseen]
@@ -128,8 +135,8 @@ def test_wrong_objects_are_refused(arguments: dict[str, object], message: str) -
 
 
 def test_a_recording_of_another_object_is_outside_the_band() -> None:
-    *seen, other = recordings(6)
-    model = identify(seen)
+    *_, other = recordings(7)
+    model = of_six_recordings()
     verified = verify(model, stiffer(other, 1.5))
     assert verified.within_band is not None
     assert verified.within_band < 0.2
@@ -137,9 +144,8 @@ def test_a_recording_of_another_object_is_outside_the_band() -> None:
 
 
 def test_forces_of_any_size_have_the_same_band() -> None:
-    made = recordings(4)
-    tiny = [stiffer(each, 2.0**-90) for each in made]
-    band, scaled = identify(made).band, identify(tiny).band
+    tiny = [stiffer(each, 2.0**-90) for each in recordings(6)]
+    band, scaled = of_six_recordings().band, identify(tiny).band
     assert band is not None
     assert scaled is not None
     np.testing.assert_allclose(scaled.outer, 2.0**-90 * band.outer, rtol=1e-6)

@@ -184,7 +184,7 @@ def test_crossing_strokes_are_replaced_by_their_mean() -> None:
 
 
 def test_slope_bounds_and_a_coupling_limit_the_slope_everywhere() -> None:
-    x = np.linspace(0.0, 0.6, 1200)
+    x = np.linspace(0.0, 0.6, 600)
     y = 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
     y = y + np.random.default_rng(0).normal(0.0, 0.02, len(x))
     fine = np.linspace(0.0, 0.6, 100_001)
@@ -232,8 +232,8 @@ def test_a_monotone_force_never_falls() -> None:
 @pytest.mark.parametrize("hysteresis", [False, True], ids=["one-force", "two-strokes"])
 def test_fixed_force_is_kept_with_small_error(hysteresis: bool) -> None:
     random = np.random.default_rng(5)
-    x = np.tile(np.linspace(0.0, 0.6, 600), 2)
-    side = np.repeat([1.0, -1.0], 600) if hysteresis else None
+    x = np.tile(np.linspace(0.0, 0.6, 300), 2)
+    side = np.repeat([1.0, -1.0], 300) if hysteresis else None
     y = 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01) + 0.03
     y = y + random.normal(0.0, 0.02, len(x)) + (0.0 if side is None else 0.2 * side)
     free = fit_environment(x[:, None], y, side)
@@ -258,7 +258,7 @@ TURN = 0.004
 
 def pressed_onto_a_wall(late_s: float, seed: int = 0) -> Recording:
     """Returns 0.4 N of friction that ends before a wall of 10^4 N/m at 3.6 mm; both strokes at 10 mm/s."""
-    t = np.arange(0.0, 0.8, 5e-4)
+    t = np.arange(0.0, 0.8, 1e-3)
 
     def force(t: np.ndarray) -> np.ndarray:
         x = TURN * (1.0 - np.abs(np.clip(t, 0.0, 0.8) / 0.4 - 1.0))

@@ -69,7 +69,7 @@ def test_held_out_rows_outside_fitted_range_do_not_refuse_a_network() -> None:
 
 
 def test_decisions_report_the_criterion_of_each_model_class() -> None:
-    straight, curve, *_ = identify(sample_recording(1, duration_s=20.0)).notes["model_selection"]
+    straight, curve, *_ = identify(sample_recording(1, duration_s=10.0)).notes["model_selection"]
     reason = r"accepted \(lowers BIC by \d+\)"
     assert re.fullmatch(f"straight line: {reason}", straight)
     assert re.fullmatch(f"curve over position: {reason}", curve)

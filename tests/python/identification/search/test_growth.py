@@ -117,13 +117,13 @@ def test_force_with_a_kink_is_grown_as_without_wide_wavelets(
         return tried[-1]
 
     monkeypatch.setattr(Growth, "_smooth", noted)
-    problem = over_two_inputs(creased, 120)
+    problem = over_two_inputs(creased, 60)
     found = grown(problem)
     (smooth,) = tried
     assert smooth is not None
     assert problem.rmse(smooth.solution) > problem.rmse(found.solution)
     monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
-    without = grown(over_two_inputs(creased, 120))
+    without = grown(over_two_inputs(creased, 60))
     assert np.array_equal(found.solution.coefficients, without.solution.coefficients)
 
 
