@@ -39,7 +39,7 @@ def strokes(seed: int, loss: float = 0.3) -> Recording:
 def test_errors_agree_with_their_standard_errors() -> None:
     """Errors of model force and slope, divided by their standard errors, have a standard deviation of 1."""
     ratios, slopes = [], []
-    for seed in range(8):
+    for seed in range(15):
         recording = noisy(seed)
         model = palpate.identify(recording)
         known = uncertainty(model, recording)
