@@ -191,7 +191,7 @@ class MemoryFit:
         self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
     ) -> None:
         self.motions, self.least = motions, least
-        columns = np.concatenate([resting(m.position[m.touched]) for m in motions])
+        columns = resting(np.concatenate([m.position[m.touched] for m in motions]))
         self._force = np.concatenate([m.force[m.touched] for m in motions])
         self.n_rows = len(self._force)
         bends = (
