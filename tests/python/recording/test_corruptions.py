@@ -26,12 +26,6 @@ def test_a_corrupted_recording_gives_a_correct_error_or_a_warning_that_names_a_c
     assert [described(each) for each in outcomes if each.unreported] == []
 
 
-def test_a_second_recording_that_never_touches_the_object_gets_a_warning() -> None:
-    outcome = outcome_of(case_of(59))  # forces times 0.001: all are below the least force in contact
-    assert not outcome.crashed
-    assert outcome.warned, described(outcome)
-
-
 RELAXING = {"switch_springs/linear_housing_tx_short_45g.csv": "relaxation"}
 """Clean recordings whose force changes while the tool waits, by 2 gf, and the cause to be named"""
 

@@ -156,6 +156,14 @@ def test_irregular_times_and_several_recordings_are_one_object() -> None:
     assert not any("left out of the fit" in note for note in model.notes["identification"])
 
 
+def test_a_second_recording_that_never_touches_the_object_is_not_called_good() -> None:
+    time, position = ramps_and_holds(1, 0.1)
+    touching = np.maximum(position - 0.3, 0.0)
+    force = np.maximum(relaxing([2.0], [0.7]).force_over_time(time, touching)[0], 0.0)
+    pair = [Recording.from_arrays(position, force * factor, time=time) for factor in (1.0, 1e-3)]
+    assert palpate.identify(pair).verdict.level != "good"
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(("tau", "seconds"), [([0.3], 1.5), ([0.3, 2.0], 8.0)])
 def test_a_rendered_memory_is_identified_again_within_a_just_noticeable_difference(
