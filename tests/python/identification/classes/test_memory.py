@@ -157,7 +157,7 @@ def test_irregular_times_and_several_recordings_are_one_object() -> None:
 
 
 def test_a_second_recording_that_never_touches_the_object_is_not_called_good() -> None:
-    time, position = ramps_and_holds(1, 0.1)
+    time, position = ramps_and_holds(1, 0.2)
     touching = np.maximum(position - 0.3, 0.0)
     force = np.maximum(relaxing([2.0], [0.7]).force_over_time(time, touching)[0], 0.0)
     pair = [Recording.from_arrays(position, force * factor, time=time) for factor in (1.0, 1e-3)]
