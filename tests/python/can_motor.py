@@ -2,8 +2,7 @@
 """Motor, hand and bus of the emulated CAN drives, for tests and for the pages of the site.
 
 The bus is a Unix socket that carries the frames of SocketCAN. Each command of the host is one millisecond of
-the motor, so that no result depends on the speed of the machine. The watchdog uses the clock of this machine,
-or the commands if `counts_commands` is set.
+the motor and of its watchdog, so that no result depends on the speed of the machine.
 """
 
 from __future__ import annotations
@@ -12,10 +11,10 @@ import contextlib
 import math
 import socket
 import struct
-import time
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass, field
+from threading import Event
 
 from emulated_device import answer_next
 
@@ -47,8 +46,8 @@ class CanMotor(ABC):
     """Commands whose answer is lost"""
     jolt: tuple[int, float] | None = None
     """Command from which on the hand is elsewhere, and by how much [rad]"""
-    counts_commands: bool = False
-    """True if the watchdog counts commands of one millisecond"""
+    idle_s: float = 0.0
+    """Time without a command that a test lets pass [s]"""
     enabled: bool = False
     watchdog_s: float = 0.0
     """Time without a command after which there is no torque; 0: never [s]"""
@@ -59,6 +58,8 @@ class CanMotor(ABC):
     commands: int = 0
     last_command: float = 0.0
     largest_torque: float = 0.0
+    disconnected: Event = field(default_factory=Event)
+    """Set after the last frame of a connection that was closed"""
     trace: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=100_000))
     """Position and torque at the end of the last milliseconds"""
 
@@ -66,7 +67,7 @@ class CanMotor(ABC):
         self.position = self.center
 
     def now(self) -> float:
-        return self.commands * STEP_S if self.counts_commands else time.monotonic()
+        return self.commands * STEP_S + self.idle_s
 
     @property
     def torque(self) -> float:
@@ -126,3 +127,4 @@ class CanMotor(ABC):
         with connection, contextlib.suppress(ConnectionError):
             while answer_next(connection, self.replies):
                 pass
+        self.disconnected.set()

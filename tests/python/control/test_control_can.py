@@ -6,7 +6,6 @@ import math
 import random
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -18,7 +17,7 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from control_program import PROGRAM, control, every_row, needs_program, run
+from control_program import PROGRAM, control, every_row, needs_program, run, start
 from emulated_device import emulated
 from mit_drive import Drive
 from models_by_hand import model_by_hand
@@ -27,8 +26,6 @@ from palpate._core.run import device_help, measured_device_help, transports
 from palpate.planning import example_profiles
 
 WORDS = ["--uncertified", "--frozen-s", "0"]
-REAL_TIME = [*WORDS, "--wait-ms", "2000", "--lowest-rate-share", "0"]
-"""Options with which a busy machine does not end a run in real time"""
 
 
 @pytest.fixture
@@ -149,7 +146,7 @@ def test_a_fault_of_the_bus_ends_in_zero_torque(
         ran = control(spring, "--device", f"mit:{bus}:1:damiao-4310", *WORDS, "--duration-s", 5)
         assert ran.returncode == code, ran.stderr
         assert sentence in ran.stderr + ran.stdout
-        time.sleep(0.05)
+        drive.disconnected.wait()
         assert drive.torque == 0.0
 
 
@@ -176,17 +173,20 @@ def test_a_busy_machine_does_not_refuse_an_emulated_drive(bus: Path, spring: Pat
 
 @needs_program
 def test_the_watchdog_ends_the_torque_of_a_killed_program(drive: Drive, bus: Path, spring: Path) -> None:
-    words = [spring, "--device", f"mit:{bus}:1:damiao-4310", *REAL_TIME, "--duration-s", "inf", "--ramp-s", 0]
-    process = subprocess.Popen([str(PROGRAM), *map(str, words)], stderr=subprocess.DEVNULL)
-    deadline = time.monotonic() + 60
-    while drive.largest_torque < 0.05 and time.monotonic() < deadline:
+    words = [spring, "--device", f"mit:{bus}:1:damiao-4310", *WORDS, "--duration-s", "inf", "--ramp-s", 0]
+    process = start(PROGRAM, *words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while drive.largest_torque < 0.05:
+        assert process.poll() is None
         time.sleep(0.01)
-    assert drive.largest_torque >= 0.05
-    process.send_signal(signal.SIGKILL)
+    process.kill()
     process.wait()
-    time.sleep(0.05)
-    assert drive.enabled
-    assert drive.torque == 0.0
+    drive.disconnected.wait()
+    last_torque = drive.torque
+    assert last_torque != 0.0
+    drive.idle_s = 0.99 * drive.watchdog_s
+    assert (drive.enabled, drive.torque) == (True, last_torque)
+    drive.idle_s = 1.01 * drive.watchdog_s
+    assert (drive.enabled, drive.torque) == (True, 0.0)
 
 
 @needs_program

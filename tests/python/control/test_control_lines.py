@@ -71,7 +71,7 @@ def run_on(kind: str, planned: Path, drive: CanMotor, *options: object) -> Any:
 
 
 def made(kind: str, **faults: Any) -> CanMotor:
-    return KINDS[kind][0](counts_commands=True, **faults)
+    return KINDS[kind][0](**faults)
 
 
 def test_a_planned_line_is_rendered_recorded_and_identified_again(

@@ -302,7 +302,7 @@ def test_a_drive_in_position_mode_renders_the_object_against_its_hand(tmp_path: 
     plan = palpate.plan(model, drive_display())
     assert plan.certificate is not None
     assert plan.certificate.certified, plan.verdict
-    with emulated(tmp_path / "bus", Drive(counts_commands=True)) as drive:
+    with emulated(tmp_path / "bus", Drive()) as drive:
         done = drive_run(plan, tmp_path, "--duration-s", "3", "--record", tmp_path / "record.csv")
         assert done.returncode == 0, done.stderr + done.stdout
         # The drive was commanded a position with stiffness and damping, and is disabled at the end
@@ -330,7 +330,7 @@ def test_a_drive_in_position_mode_renders_the_object_against_its_hand(tmp_path: 
 )
 def test_a_drive_refuses_a_display_that_it_is_not(changes: Any, words: str, tmp_path: Path) -> None:
     plan = palpate.plan(model_by_hand(alpha=[[5.0]], weight=[0.02], linear=[2.0]), drive_display(**changes))
-    with emulated(tmp_path / "bus", Drive(counts_commands=True)):
+    with emulated(tmp_path / "bus", Drive()):
         refused = drive_run(plan, tmp_path)
     assert refused.returncode == 2
     assert words in refused.stderr
