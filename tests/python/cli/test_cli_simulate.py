@@ -262,9 +262,7 @@ def test_progress_is_called_during_the_simulation() -> None:
     scheme = Scheme(structure="implicit")
     with pytest.raises(_AlarmError):
         _core.simulation.simulate(model_by_hand(), scheme, DeviceProfile(), Hand(), 3600.0, progress=report)
-    assert ticks[0] == 0
-    assert ticks == sorted(ticks)
-    assert len(ticks) > 1
+    assert 0 == ticks[0] < ticks[1] < ticks[2] < 3_600_000
 
 
 @pytest.mark.parametrize("substeps", [0, -1, 1001, 2**31 - 1])
