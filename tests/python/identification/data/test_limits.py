@@ -71,37 +71,23 @@ def identified(name: str, law: Law) -> palpate.Model:
     return palpate.identify(IMPERFECT[name](law))
 
 
-@pytest.mark.parametrize(
-    "name",
-    sampled(
-        IMPERFECT,
-        *(
-            "rows five times",
-            "position and force held",
-            "noise of correlation 0.5",
-            "6-bit force, one stroke",
-            "6-bit force, several strokes",
-        ),
-    ),
+FAST = (
+    "rows five times",
+    "position and force held",
+    "noise of correlation 0.5",
+    "6-bit force, several strokes",
 )
+"""Defects of rows that the quick run tests"""
+
+
+@pytest.mark.parametrize("name", sampled(IMPERFECT, *FAST, "6-bit force, one stroke"))
 def test_straight_line_is_found_in_imperfect_rows(name: str) -> None:
     model = identified(name, line)
     assert model.n_wavelets <= 1
     assert true_nrmse(model, line) < 0.01
 
 
-@pytest.mark.parametrize(
-    "name",
-    sampled(
-        IMPERFECT,
-        *(
-            "rows five times",
-            "position and force held",
-            "noise of correlation 0.5",
-            "6-bit force, several strokes",
-        ),
-    ),
-)
+@pytest.mark.parametrize("name", sampled(IMPERFECT, *FAST))
 def test_wall_is_found_with_few_wavelets(name: str) -> None:
     model = identified(name, wall)
     assert 3 <= model.n_wavelets <= 8
