@@ -229,6 +229,7 @@ DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "clas
 RULES = (
     Rule("rows that wait are not fitted", "recording.conversion", "waits", _no_waits),
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
+    Rule("positions of a fit are in whole steps", f"{DATA}.rows", "stepped", _first),
     Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule("period is fitted", f"{DATA}.period", "_fitted", lambda x, f, way, period: period),

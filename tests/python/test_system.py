@@ -26,7 +26,7 @@ def test_all_verbs_without_a_device_work_on_another_system(tmp_path: Path) -> No
         "verify press.json press.csv",
         "plan press.json --device voice-coil -o press.json",
         "simulate press.json --duration-s 0.5",
-        "report press.json -o press.html",
+        "report press.json press.csv -o press.html",
         "export press.json --c -o press.h",
         "show press.csv",
     )

@@ -134,6 +134,13 @@ def test_a_change_of_units_changes_the_units_of_the_model_only(kind: str) -> Non
         assert_equal(kind, model, forces(model, position=x) / f)
 
 
+@pytest.mark.parametrize("kind", sampled(KINDS, "position"))
+def test_units_of_powers_of_two_give_the_same_model_bit_by_bit(kind: str) -> None:
+    x, f = 2.0**20, 2.0**-20
+    model = identified(changed(recorded(kind), position=x, force=f), kind)
+    assert np.array_equal(forces(model, position=x) / f, forces(reference(kind)))
+
+
 @pytest.mark.parametrize("kind", sampled(["position_velocity", "memory"], "position_velocity"))
 @pytest.mark.parametrize("factor", sampled([1e-3, 1e3], 1e3))
 def test_a_change_of_the_unit_of_time_changes_velocities_and_relaxation_times_only(
@@ -188,7 +195,7 @@ def test_both_signs_reversed_reverse_the_force(kind: str) -> None:
     assert np.abs(new - old).max() <= NOISE * np.ptp(old)
 
 
-@pytest.mark.parametrize("kind", sampled(["position", "hysteresis", "memory"], "position"))
+@pytest.mark.parametrize("kind", sampled(["position", "hysteresis", "memory"], "hysteresis"))
 def test_a_network_is_identified_from_its_own_force(kind: str) -> None:
     recording = recorded(kind)
     assert recording.time is not None

@@ -19,7 +19,7 @@ PLAIN = palpate.identify(recorded(X, Y))
 
 def test_reported_nrmse_is_that_of_the_rows() -> None:
     residual = Y - PLAIN.force(X)
-    assert PLAIN.fit.nrmse == pytest.approx(np.sqrt(np.mean(residual**2)) / np.std(Y), rel=1e-7)
+    assert PLAIN.fit.nrmse == pytest.approx(np.sqrt(np.mean(residual**2)) / np.std(Y), rel=1e-9)
     assert PLAIN.fit.nrmse == pytest.approx(palpate.verify(PLAIN, recorded(X, Y)).nrmse, rel=1e-9)
 
 
