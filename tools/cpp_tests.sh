@@ -40,4 +40,15 @@ if [ "$preset" = rtsan ]; then
     # Only these tests run a tick without a forbidden action.
     exec build/rtsan/tests/cpp/test_run --gtest_brief=1 --gtest_filter='Controller.*:Tick.*:Campaign.*'
 fi
+# The tests depend on the programs, on files of tests/ and docs/figures/, and on the scale alone. Tests that passed run
+# again after one of these has changed; rm build/PRESET/passed runs them anyway.
+tested="$scale $({
+    find "build/$preset" -type f -perm -u+x
+    find tests docs/figures -type f -not -path '*/__pycache__/*' -not -path 'tests/python/*'
+} | LC_ALL=C sort | tr '\n' '\0' | xargs -0 sha256sum | sha256sum)"
+if [ "$(cat "build/$preset/passed" 2>/dev/null)" = "$tested" ]; then
+    echo "$preset: the C++ tests passed with these programs and files"
+    exit
+fi
 "${with[@]}" ctest --preset "$preset" "${chosen[@]}" --parallel "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" --progress
+echo "$tested" >"build/$preset/passed"
