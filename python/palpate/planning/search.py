@@ -338,7 +338,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 
     If no realistic device property is sufficient, the text states the slope that the device renders, the
     need at the highest rate, and the scale of an object that the device renders. The text is empty if no
-    property helps.
+    property helps, or no realistic one for a force of position and velocity.
 
     Parameters
     ----------
@@ -383,6 +383,8 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
                 realistic.append(" and ".join(each.text(found) for each in properties))
         if realistic:
             return f"needs {', or '.join(realistic)}"
+        if task.model.of_velocity:  # its slope may be low; the refused inequality states the limit
+            return ""
         at_limit = rate.improved(device, _FASTEST_HZ * device.period_s)
         stronger = _improved(at_limit, short, fits)
         need = "" if stronger is None else " and ".join(each.text(stronger) for each in short)

@@ -70,6 +70,17 @@ def test_device_too_weak_for_the_velocity_slope_is_refused_with_its_need() -> No
         assert "only direct rendering of the identified model has known bounds" in reasons[name]
 
 
+def test_device_that_no_realistic_property_helps_is_refused_with_the_inequality(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = fluid_by_hand(linear=[5.0, 100.0]).save(tmp_path / "joint.json")
+    assert main(["plan", str(path), "--device", "bench-knob"]) == 1
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "not renderable: no structure is proved stable on this device" in shown
+    assert "b >= T M / 2 + B_v T / period needs 120" in shown
+    assert "too steep" not in shown
+
+
 @pytest.mark.parametrize(
     "requirement", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"object_damping": 0.1}]
 )
