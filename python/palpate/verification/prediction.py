@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core.rendering import Scheme, default_play_radius, structure_names
-from .._typing import Float1D, Int8Vector
+from .._typing import Float1D
 from ..errors import InputError
 from ..identification.data.rows import input_columns
 from ..identification.data.strokes import HysteresisInput
@@ -50,8 +50,9 @@ class Prediction:
     """(n,) True for the rows of the recording that are used"""
     force: Float1D
     """(k,) force of the model at the used rows"""
-    extrapolated: int
-    """Number of used rows outside the model's domain"""
+    extrapolated: NDArray[np.bool_]
+    """(j,) True where the force is extrapolated, for the used rows at which the tool moves; a wait repeats
+    one position"""
     notes: tuple[str, ...]
     position: Float1D
     """(k,) positions at which the force was computed"""
@@ -87,36 +88,45 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
         recording, notes = with_strokes(model, recording)
     moving = model.mass is not None or model.damping is not None
     found = (_moving if moving else _static)(model, recording, play_radius)
-    if model.memory is None:
-        found = _without_waits(model, found, _roles(model, recording))
+    found = _informative(model, recording, found)
     return replace(found, notes=notes + found.notes)
 
 
-def _roles(model: Model, recording: Recording) -> Int8Vector:
-    """Returns the role of each row (n,); an approach is compared inside the domain of the model."""
+def _informative(model: Model, recording: Recording, found: Prediction) -> Prediction:
+    """Leaves out the rows that show no force over position, as the identification does.
+
+    An approach is compared inside the domain of the model, a wait with a model with memory, except in the air
+    below this domain.
+    """
     role = roles_of(recording, float(recording.position.max()))
-    role[(role == Role.APPROACH) & (recording.position >= model.lower[0])] = Role.MOVING
-    return role
-
-
-def _without_waits(model: Model, found: Prediction, role: Int8Vector) -> Prediction:
-    """Leaves out the rows that show no force over position, as the identification does."""
-    fitted = role == Role.MOVING
-    kept = fitted[found.rows]
-    if kept.all() or not kept.any():
+    below = recording.position < model.lower[0]
+    role[(role == Role.APPROACH) & ~below] = Role.MOVING
+    moving = compared = role == Role.MOVING
+    if model.memory is not None:
+        in_air = below & (model.below == "free")
+        compared = moving | (role == Role.HOLD) | ((role == Role.REST) & ~in_air)
+    kept, moves = compared[found.rows], moving[found.rows]
+    if not moves.any():
         return found
-    position = found.position[kept]
-    outside = int(np.count_nonzero(model.extrapolated(position))) if model.dimension == 1 else 0
+    notes = () if kept.all() else (unused_rows(np.where(compared, Role.MOVING, role), "compared"),)
     return replace(
         found,
-        rows=found.rows & fitted,
+        rows=found.rows & compared,
         force=found.force[kept],
-        extrapolated=outside if model.dimension == 1 else min(found.extrapolated, len(position)),
-        notes=(*found.notes, unused_rows(role, "compared")),
-        without_motion=int(np.count_nonzero(~fitted)),
-        position=position,
+        extrapolated=found.extrapolated[moves],
+        notes=found.notes + notes,
+        without_motion=int(np.count_nonzero(~compared)),
+        position=found.position[kept],
         side=None if found.side is None else found.side[kept],
     )
+
+
+def _extrapolated(model: Model, position: Float1D) -> NDArray[np.bool_]:
+    """Returns True (n,) for positions outside the domain of a model of one position, except where the tool
+    has left the object: there the model states a force of zero."""
+    below = (position < model.lower[0]) & (model.below == "free")
+    above = (position > model.upper[0]) & (model.above == "free")
+    return np.asarray(model.extrapolated(position) & ~(below | above))
 
 
 def _moving(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
@@ -136,9 +146,8 @@ def _moving(model: Model, recording: Recording, play_radius: float | None) -> Pr
     force = (static.force + total[static.rows])[known[static.rows]]
     left_out = int(np.count_nonzero(static.rows & ~known))
     notes = (NO_VELOCITY.format(left_out),) if left_out else ()
-    outside = model.extrapolated(recording.position[rows])
-    outside_rows = int(np.count_nonzero(outside))
-    return Prediction(rows, force, outside_rows, static.notes + notes, recording.position[rows])
+    position = recording.position[rows]
+    return Prediction(rows, force, _extrapolated(model, position), static.notes + notes, position)
 
 
 def _static(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
@@ -155,8 +164,7 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
         outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
         left_out = int(np.count_nonzero(~rows))
         notes = (NO_VELOCITY.format(left_out),) if left_out else ()
-        outside_rows = int(np.count_nonzero(outside))
-        return Prediction(rows, model.predict(X), outside_rows, notes, recording.position[rows])
+        return Prediction(rows, model.predict(X), outside, notes, recording.position[rows])
     flight = flight_of(recording)
     position: Float1D = recording.position
     if flight.object_position is not None:
@@ -175,10 +183,9 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
         state = _state(model, recording, flight, play_radius)
         rows, notes, side = state.known, notes + state.notes, state.side[state.known]
         force = model.force(position[rows], direction=side)
-    outside_rows = int(np.count_nonzero(model.extrapolated(position[rows])))
-    return Prediction(
-        rows, force, outside_rows, notes, position[rows], side, over_time=model.memory is not None
-    )
+    position = position[rows]
+    outside = _extrapolated(model, position)
+    return Prediction(rows, force, outside, notes, position, side, over_time=model.memory is not None)
 
 
 def _relaxing(model: Model, recording: Recording) -> Float1D:

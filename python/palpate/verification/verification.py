@@ -87,7 +87,8 @@ class Verification:
     fresh: bool
     """True if the model was not identified on the rows of this recording"""
     extrapolated: int
-    """Number of evaluated rows outside the model's domain"""
+    """Number of evaluated rows at which the tool moves and the force is extrapolated: outside the model's
+    domain, except in the air in which the model states that the force is zero"""
     units: Mapping[str, str]
     notes: tuple[str, ...] = ()
     verdict: Verdict = GOOD
@@ -146,7 +147,7 @@ class Verification:
             "largest": f"{force_unit.text(self.worst)} in one row, at position {position}",
             "felt": most_noticed(self.strokes).noticed(position_unit, force_unit),
             **band,
-            "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",
+            "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} extrapolated",
             "recording": self._freshness,
         }
 
@@ -244,7 +245,7 @@ def verify(
         durbin_watson=durbin_watson(residual),
         n=len(residual),
         fresh=fresh,
-        extrapolated=prediction.extrapolated,
+        extrapolated=int(np.count_nonzero(prediction.extrapolated)),
         units=dict(recording.units),
         notes=notes,
         prediction=prediction,
@@ -304,12 +305,13 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
                 "verify with another recording, or identify with --hold-out-every 5"
             )
         )
-    outside = found.extrapolated / found.n
+    of_moving = found.prediction.extrapolated
+    count, outside = len(of_moving), float(np.mean(of_moving))
     if outside > FEW_OUTSIDE:
         judge = no if outside > MOST_OUTSIDE else usable
         findings.append(
             judge(
-                f"{found.extrapolated} of {found.n} rows ({outside:.0%}) lie outside the model's domain"
+                f"{found.extrapolated} of {count} rows ({outside:.0%}) lie outside the model's domain"
                 f"{_domain(model, recording)}, where the force is extrapolated: identify on a recording of "
                 "this range"
             )

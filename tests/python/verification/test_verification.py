@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from imperfect import press_and_release
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
+from palpate._core.model import Memory
 from palpate.model import Fit
 from palpate.plotting import plot
 from palpate.recording import Source, sample_recording
@@ -454,6 +455,56 @@ def test_waits_of_a_model_with_memory_are_compared() -> None:
     model = identify(recording)
     assert model.memory is not None
     assert verify(model, recording).n == len(x)
+
+
+def contact_model(memory: bool, **change: Any) -> Model:
+    """Returns a model of force 2 x that the tool leaves at x = 0, with a branch of stiffness 3 if
+    requested."""
+    branch = {"alpha": [], "beta": [], "weight": [], "linear": 0.0, "bias": 1.0, "stiffness": [3.0]}
+    given: dict[str, Any] = {"bias": 0.0, "below": "free"}
+    if memory:
+        given |= {"kind": "memory", "memory": Memory(**branch, time_constant_s=[0.5])}
+    return model_of(stroke().source, **given | change)
+
+
+def contacts(memory: bool, wait_s: float = 1.0, shift: float = 0.0) -> Recording:
+    """Returns two contacts of the object of `contact_model` with a wait in air before and between them."""
+    lasts = [wait_s, 0.5, 1.0, 0.5, wait_s, 0.5, 0.5]
+    time = np.arange(0.0, sum(lasts), 5e-3)
+    x = np.interp(time, np.cumsum([0.0, *lasts]), [-0.6, -0.6, 1.0, 1.0, -0.6, -0.6, 1.0, -0.6])
+    model = contact_model(memory)
+    force = model.force_over_time(time, x)[0] if memory else model.force(x)
+    force += np.random.default_rng(1).normal(0.0, 2e-3, len(x))
+    return Recording.from_arrays(x + shift, force, time, units=RAD)
+
+
+@pytest.mark.parametrize("memory", [False, True])
+def test_air_below_a_free_model_neither_counts_as_extrapolated_nor_changes_the_error(memory: bool) -> None:
+    model, recording = contact_model(memory), contacts(memory)
+    found, longer = verify(model, recording), verify(model, contacts(memory, wait_s=20.0))
+    assert str(found.verdict) == str(longer.verdict) == "good"
+    assert (found.extrapolated, longer.extrapolated) == (0, 0)
+    assert recording.position[found.rows].min() > -0.15
+    assert longer.n == pytest.approx(found.n, abs=4)
+    assert longer.nrmse == pytest.approx(found.nrmse, rel=0.1)
+    linear = verify(contact_model(memory, below="linear"), recording)
+    below = recording.position[linear.rows] < 0.0
+    assert linear.extrapolated == np.count_nonzero(below) > 0
+
+
+@pytest.mark.parametrize("memory", [False, True])
+@pytest.mark.parametrize("shift", [-0.3, 0.3])
+def test_contact_at_another_position_is_named_by_its_error(memory: bool, shift: float) -> None:
+    found = verify(contact_model(memory), contacts(memory, shift=shift))
+    assert found.nrmse > 0.3
+    assert "has at most 0.1" in found.verdict.reasons[0]
+
+
+def test_a_wait_just_outside_the_domain_counts_as_little_as_the_motion_there() -> None:
+    found = verify(contact_model(memory=True, upper=[0.999]), contacts(memory=True))
+    assert np.count_nonzero(found.compared.position > 0.999) > 190
+    assert found.extrapolated < 5
+    assert "outside" not in str(found.verdict)
 
 
 def differs_on(share: float, noise: float = 0.0) -> Recording:
