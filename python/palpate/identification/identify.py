@@ -149,26 +149,23 @@ def identify(
             require_in_range(name, column)
     fitted, sections = in_sections(recordings)
     with one_thread():
-        network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
+        network, chosen, rows = _with_memory(recordings, fitted, settings, object_of)
         if not sections and network.residual is not None and len(network.residual) == sum(map(len, fitted)):
             # Rows behind a turn with a small weight share an error: none of them is wrong alone.
             counted = network.residual * (1.0 if network.share is None else network.share)
             residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
             if informative.drop_wrong_readings(residuals):
                 fitted = recordings = informative.recordings
-                network, chosen, rows = _fitted_with_period(fitted, settings, object_of)
-        settings = chosen
-        rest = _resting(rows, settings)
-        network = better_with_memory(network, recordings, len(rows.force), settings, rest)
+                network, chosen, rows = _with_memory(recordings, fitted, settings, object_of)
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
     network = replace(network, log=Log(rows=[*informative.notes, *unused, *sections]) + network.log)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     known = rows.order if rows.side is None else rows.side
-    attracts = settings.below == "linear"
+    attracts = chosen.below == "linear"
     verdict = verdict_of(network, recordings, known if every_row else None, attracts)
-    model = model_of(network, recordings[0].units, source, settings, verdict)
+    model = model_of(network, recordings[0].units, source, chosen, verdict)
     left_out = sum(map(len, recordings)) - len(rows.force)
     model.notes["roles"] = (
         role_counts(rows.roles) | informative.dropped | ({"left out": left_out} if left_out else {})
@@ -177,6 +174,19 @@ def identify(
         on_it = rows.fitted & steepest.rows(rows.domain[:, 0], known)
         model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))
     return model
+
+
+def _with_memory(
+    recordings: Sequence[Recording],
+    fitted: Sequence[Recording],
+    options: IdentifyOptions,
+    objects: Sequence[int],
+) -> tuple[FittedNetwork, IdentifyOptions, Rows]:
+    """Returns the force law that is identified from the fitted recordings, with a memory if all recordings
+    support it, the options with its period, and its rows."""
+    network, chosen, rows = _fitted_with_period(fitted, options, objects)
+    rest = _resting(rows, chosen)
+    return better_with_memory(network, recordings, len(rows.force), chosen, rest), chosen, rows
 
 
 def _fitted_with_period(

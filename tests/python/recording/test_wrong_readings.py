@@ -347,3 +347,53 @@ def test_the_first_and_the_last_rows_are_not_judged_by_rows_on_one_side(row: int
 
 def test_a_first_reading_that_is_not_judged_changes_the_curve_little() -> None:
     assert difference_from_clean(palpate.identify(recorded(PRESS, changed(FORCE, {0: 30.0})))) < 0.1
+
+
+def test_an_error_of_the_model_that_occurs_again_is_not_a_wrong_reading() -> None:
+    x = np.tile(np.concatenate([PRESS[:400:8], PRESS[400::8]]), 4)
+    contact = 0.4 * x.max()
+    at_contact = np.flatnonzero((x[:-1] < contact) != (x[1:] < contact))
+    random = np.random.default_rng(3).normal(0.0, 0.01, len(x))
+    once = np.zeros(len(x))
+    once[130] = 5.0
+    residual = random + once
+    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x, (), residual)).tolist() == [130]
+    residual[at_contact] += np.random.default_rng(4).uniform(2.0, 5.0, len(at_contact))
+    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x, (), residual)).tolist() == [130]
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_rows_of_a_contact_with_a_preload_stay(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    preload, friction = random.uniform(150.0, 400.0), random.uniform(8.0, 20.0)
+    half = 104.5 / 12.0
+    t = np.arange(0.0, 6.0 * half, 0.1) + random.uniform(0.0, 0.1)
+    x, way = (
+        -9.5 + 12.0 * (half - np.abs(t % (2.0 * half) - half)),
+        np.where(t % (2.0 * half) < half, 1.0, -1.0),
+    )
+    spring = preload / (1.0 - 0.0025 * np.maximum(x, 0.0)) + friction * way
+    force = np.clip(x / 0.5, 0.0, 1.0) * spring + random.normal(0.0, 0.5, len(x))
+    model = palpate.identify(np.round(x, 2), 10.0 * np.round(10.2 * force))
+    assert not any("wrong" in each for each in model.notes["rows"])
+
+
+def test_the_largest_forces_of_the_fastest_press_of_a_relaxing_object_stay() -> None:
+    random, corners = np.random.default_rng(3), [(0.0, -1.2)]
+    stiffness, tau = np.array([0.117, 0.05]), np.array([0.52, 5.9])
+    for speed in (0.3, 1.0, 3.0):
+        for place, wait in ((8.0 * random.uniform(0.97, 1.0), 4.0), (-1.2, 3.0)):
+            before, at = corners[-1]
+            arrived = before + abs(place - at) / (4.0 * speed)
+            corners += [(arrived, place), (arrived + wait, place)]
+    t = np.arange(0.0, corners[-1][0], 0.02)
+    x = np.interp(t, *np.transpose(corners))
+    depth, state, relaxing = np.maximum(x, 0.0), np.zeros(2), np.zeros(len(t))
+    left = np.exp(-0.02 / tau)
+    for row, step in enumerate(np.diff(depth, prepend=0.0)):
+        state = left * state + stiffness * step * tau / 0.02 * (1.0 - left)
+        relaxing[row] = state.sum()
+    force = np.where(x > 0.0, np.maximum(0.5 * np.expm1(0.35 * depth) + relaxing, 0.0), 0.0)
+    model = palpate.identify(x, force + random.normal(0.0, 0.005, len(t)), time=t)
+    assert model.memory is not None
+    assert not any("wrong" in each for each in model.notes["rows"])

@@ -369,7 +369,8 @@ def better_with_memory(
     )
     residual = recorded.spread * fit.error(refined)
     error, where_sure = _rms(residual, compared.weight), _rms(residual, compared.sure)
-    of_all = _rmse(network, recordings)
+    of_rows = _residual(network, recordings)
+    of_all = _rms(of_rows, np.array(1.0))
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
@@ -408,7 +409,9 @@ def better_with_memory(
         settled_rmse=of_all,
         settled_nrmse=(nrmse, left_out_nrmse),
         left_out_nrmse=left_out_nrmse,
-        residuals=sum(map(len, recordings)),
+        residual=of_rows,
+        share=None,
+        residuals=len(of_rows),
         log=Log(
             found.log.path + network.log.path,
             [*found.log.decisions, decision],
@@ -517,11 +520,12 @@ def _rms(residual: Float1D, weight: Float1D) -> float:
     return float(np.sqrt(np.sum(weight * residual**2) / total)) if total else 0.0
 
 
-def _rmse(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
-    """Returns the RMS error of a model with memory on all rows of recordings [force]."""
+def _residual(network: FittedNetwork, recordings: Sequence[Recording]) -> Float1D:
+    """Returns the force of all rows of recordings minus that of a model with memory (n,) [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
     )
-    errors = [model.force_over_time(part.time_or_row, part.position)[0] - part.force for part in recordings]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    return np.concatenate(
+        [part.force - model.force_over_time(part.time_or_row, part.position)[0] for part in recordings]
+    )

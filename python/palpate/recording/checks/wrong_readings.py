@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
-from ..motion import TURN_STEPS, strokes_from_order
+from ..motion import TURN_STEPS, resolution_of, strokes_from_order
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -80,36 +80,67 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby. Several wrong readings side by side are outside the range of all others. At the largest and
-    smallest positions a wall may be touched by a single row. Rows that are not in the order of a motion have
-    no neighbours, and no wrong readings. `motion` (m,) is the position of all rows in recorded order, of
-    which these rows can be a part. A residual (n,), the force minus that of a model, is compared in place of
-    the force: it does not change along a steep part.
+    row nearby; few steps of the display are no wrong reading. Several wrong readings side by side are outside
+    the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows
+    that are not in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the
+    position of all rows in recorded order, of which these rows can be a part.
+
+    A residual (n,), the force minus that of a model, is compared in place of the values: it does not change
+    along a steep part. It must also be far larger than the residuals of other strokes in the same direction
+    at the same position, where an error of the model occurs again.
     """
     found = np.zeros(len(force), dtype=bool)
     if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
         return found
-    seen = force if residual is None else residual
-    for values, shown, at_ends in (
-        (position, position, True),
-        *((each, each, True) for each in inputs),
-        (seen, force, False),
-    ):
-        reach = np.subtract(*np.quantile(shown[~found], (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE)))
-        found |= _deviating(values, position, ~found, at_ends, float(reach))
-    return found if found.mean() <= MOST_WRONG_SHARE else np.zeros(len(force), dtype=bool)
+
+    if residual is None:
+        for values in (position, *inputs):
+            found |= _deviating(values, values, position, ~found, at_ends=True)
+    found |= _deviating(force if residual is None else residual, force, position, ~found, at_ends=False)
+    if found.mean() > MOST_WRONG_SHARE:
+        return np.zeros(len(force), dtype=bool)
+    if residual is not None and found.any():
+        found[found] = np.abs(residual[found]) > WRONG_RATIO * _of_other_strokes(residual, position, found)
+    return found
+
+
+def _of_other_strokes(residual: Float1D, position: Float1D, rows: NDArray[np.bool_]) -> Float1D:
+    """Returns the usual size (k,) of the residual (n,) of the other strokes in the same direction, at the
+    positions of k of the rows (n,); 0 where there are none."""
+    side, x = strokes_from_order(position), position[rows]
+    if side is None:
+        return np.zeros(len(x))
+    number = np.cumsum(np.diff(side, prepend=0) != 0)
+    found = np.ma.masked_all((number[-1] + 1, len(x)))
+    for stroke in np.unique(number[side != 0]):
+        at = np.flatnonzero(number == stroke)
+        at = at[np.argsort(position[at], kind="stable")]
+        above = np.searchsorted(position[at], x)
+        others = (side[rows] == side[at[0]]) & (number[rows] != stroke) & (above > 0) & (above < len(at))
+        around = at[[above[others] - 1, above[others]]]
+        found[stroke, others] = np.abs(residual[around]).max(axis=0)
+    return np.asarray(np.ma.median(found, axis=0).filled(0.0))
+
+
+def _reach_and_least(values: Float1D) -> tuple[float, float]:
+    """Returns the range of measured values (n,) without few wrong ones, and the least deviation of a wrong
+    one, at least some steps of their display."""
+    reach = float(np.subtract(*np.quantile(values, (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE))))
+    steps = TURN_STEPS * resolution_of(values / reach) * reach if reach > 0.0 else 0.0
+    return reach, max(LEAST_WRONG * reach, steps)
 
 
 def _deviating(
-    values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool, reach: float
+    values: Float1D, measured: Float1D, position: Float1D, given: NDArray[np.bool_], *, at_ends: bool
 ) -> NDArray[np.bool_]:
-    """Returns True (n,) for the given rows whose value deviates from those before and after them. `reach` is
-    the range of the measured quantity.
+    """Returns True (n,) for the given rows whose value deviates from those before and after them. `measured`
+    (n,) are the readings to which the values belong.
 
     First the values are found that are further from all others than these are from each other: several of
     them hide each other from their neighbours. All others are compared with few neighbours.
     """
     found = np.zeros(len(values), dtype=bool)
+    reach, least = _reach_and_least(measured[given])
 
     def inner(rows: NDArray[np.intp], others: NDArray[np.intp]) -> NDArray[np.bool_]:
         x, of_others = position[rows], position[others]
@@ -126,11 +157,12 @@ def _deviating(
     rest = values[rows]
     found[far] = inner(far, rows) & (np.abs(values[far] - np.median(rest)) > np.ptp(rest))
     while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
-        changes = np.pad(np.abs(np.diff(values[rows])), LOCAL_ROWS, mode="reflect")
-        nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
+        changes = np.abs(np.diff(values[rows]))
+        around = np.pad(changes, LOCAL_ROWS, mode="reflect")
+        nearby = np.median(np.lib.stride_tricks.sliding_window_view(around, LOCAL_ROWS), axis=1)
         nearby = np.maximum(nearby[: len(rows)], nearby[-len(rows) :])
-        usual = np.maximum(nearby, float(np.median(np.abs(np.diff(values[rows])))))
-        wrong = _apart(values[rows], NEIGHBOUR_ROWS) > np.maximum(WRONG_RATIO * usual, LEAST_WRONG * reach)
+        usual = np.maximum(nearby, float(np.median(changes)))
+        wrong = _apart(values[rows], NEIGHBOUR_ROWS) > np.maximum(WRONG_RATIO * usual, least)
         if not at_ends:  # few rows on one side can be those of a steep part
             wrong[:NEIGHBOUR_ROWS] = wrong[-NEIGHBOUR_ROWS:] = False
         if wrong.any():
