@@ -30,12 +30,12 @@ def in_virtual_time(environment: Mapping[str, str] = os.environ) -> dict[str, st
     return {**environment, **lists}
 
 
-def run(*command: Any, timeout: float = 600.0, **options: Any) -> subprocess.CompletedProcess[str]:
+def run(*command: Any, **options: Any) -> subprocess.CompletedProcess[str]:
     """Runs a program in virtual time, and captures its output."""
     environment = in_virtual_time(options.pop("env", os.environ))
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
     words = list(map(str, command))
-    return subprocess.run(words, env=environment, text=True, check=False, timeout=timeout, **streams)
+    return subprocess.run(words, env=environment, text=True, check=False, **streams)
 
 
 def control(*arguments: Any, **options: Any) -> subprocess.CompletedProcess[str]:

@@ -111,7 +111,7 @@ class Programs:
         completed = subprocess.run(
             list(map(str, command)),
             cwd=folder, umask=settings["umask"], env=self.environment(settings),
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, timeout=60,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
         )  # fmt: skip
         return self._ended(completed.returncode, completed.stdout, settings)
 

@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.splitlines()[0])
 @pytest.mark.docs
 def test_snippet_runs(snippet: str, folder: Path) -> None:
-    subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True, timeout=300)
+    subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True)
 
 
 @needs_program
@@ -79,7 +79,6 @@ def test_all_commands_except_those_of_the_installation_run_in_their_order(folder
             capture_output=True,
             text=True,
             check=False,
-            timeout=300,
         )
         assert completed.returncode == 0, f"{shlex.join(arguments)}: {completed.stdout}{completed.stderr}"
 

@@ -29,15 +29,13 @@ MISSING = next(
 needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation available")
 
 
-def emulated(
-    *command: Any, device: Sequence[str] = (), timeout: float = 600.0
-) -> subprocess.CompletedProcess[str]:
+def emulated(*command: Any, device: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
     """Runs a command with the emulated USB device; `device` are options of tests/usb/run_emulated.py.
 
     The clock of the command shows the time of the device, so a busy machine has no effect.
     """
     words = [emulator(), "--lock-step", *device, "--", *command]
-    return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
+    return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
 
 
 @dataclass

@@ -38,7 +38,7 @@ class Served:
     ) -> tuple[int, bytes, Mapping[str, str]]:
         """Returns status, content and headers of an answer."""
         assert self.address.hostname is not None
-        connection = HTTPConnection(self.address.hostname, self.address.port, timeout=60)
+        connection = HTTPConnection(self.address.hostname, self.address.port)
         folder = self.address.path if token is None else f"/{token}/"
         with closing(connection):
             connection.request(method, folder + path, body, dict(headers or {}))

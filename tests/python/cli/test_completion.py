@@ -34,7 +34,7 @@ def needs(shell: str) -> None:
 def run(command: list[str], folder: Path, **variables: str) -> str:
     environment = {**os.environ, "PATH": PROGRAMS, **variables}
     completed = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=60
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
     assert (completed.returncode, completed.stderr) == (0, "")
     return completed.stdout

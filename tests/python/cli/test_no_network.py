@@ -64,7 +64,6 @@ def run(command: Sequence[object], folder: Path) -> subprocess.CompletedProcess[
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
     )
 
 

@@ -167,7 +167,7 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
     process = start(*command)
     wait_for_rows(Path(f"{out}.part"), process, 500)  # rows of the start ramp are not identified
     process.send_signal(signal_number)
-    output, messages = process.communicate(timeout=30)
+    output, messages = process.communicate()
     assert process.returncode == 0, output + messages
     assert json.loads(output)["recorded"] == len(every_row(out))
 

@@ -173,7 +173,7 @@ def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
         time.sleep(0.2)
         sent_at_s = time.monotonic()
         process.send_signal(signal.SIGINT)
-        _, messages = process.communicate(timeout=60)
+        _, messages = process.communicate()
         # Ctrl-C ends a computation of many seconds after 0.2 s, or later if other tests load the machine.
         assert time.monotonic() - sent_at_s < 3.0
     assert process.returncode == 130

@@ -189,7 +189,7 @@ def test_the_recording_does_not_take_the_place_of_a_closed_standard_input(tmp_pa
     wait_for_rows(tmp_path / "rendered.csv.part", process)
     assert os.readlink(f"/proc/{process.pid}/fd/0") == "/dev/null"
     process.send_signal(signal.SIGINT)
-    output, messages = process.communicate(timeout=20)
+    output, messages = process.communicate()
     assert process.returncode == 0, messages
     assert len(every_row(out)) == json.loads(output)["ticks"]
 
@@ -202,7 +202,7 @@ def test_a_signal_ends_the_run_with_exit_code_0_and_a_complete_recording(
     process = start(PROGRAM, MODEL, "--duration-s", "inf", "--record", out, "--json")
     wait_for_rows(tmp_path / "rendered.csv.part", process, 500)  # rows of the start ramp cannot be identified
     process.send_signal(signal_number)
-    output, messages = process.communicate(timeout=20)
+    output, messages = process.communicate()
     assert process.returncode == 0, messages
     assert json.loads(output)["ended"] == "stopped on request"
     assert len(every_row(out)) == json.loads(output)["ticks"]

@@ -155,7 +155,7 @@ def test_the_recording_of_a_failed_run_is_not_replaced_by_the_next_run(tmp_path:
 
 def stop_with_ctrl_c(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
     process.send_signal(signal.SIGINT)
-    output, messages = process.communicate(timeout=60)
+    output, messages = process.communicate()
     return subprocess.CompletedProcess(process.args, process.returncode, output, messages)
 
 

@@ -225,7 +225,7 @@ def test_a_signal_sends_zero_torque_disables_the_device_and_is_reported(
     assert "emulated knob" in process.stderr.readline()
     wait_for_rows(Path(f"{part}.part"))
     process.send_signal(signal_number)  # the emulator forwards the signal to palpate-control
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate()
     assert process.returncode == 0
     assert "stopped on request" in output
     assert frames(trace)[-1].torque == 0.0
