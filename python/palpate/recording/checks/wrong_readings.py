@@ -80,9 +80,9 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby; few steps of the display are no wrong reading. Several wrong readings side by side are outside
+    row nearby; one step of the display is not a wrong reading. Several wrong readings side by side are outside
     the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows
-    that are not in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the
+    that are not in the order of a motion have no neighbours, and none is wrong. `motion` (m,) is the
     position of all rows in recorded order, of which these rows can be a part.
 
     A residual (n,), the force minus that of a model, is compared in place of the values: it does not change
