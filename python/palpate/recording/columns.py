@@ -56,8 +56,11 @@ either."""
 DIRECTION_NAMES = ("direction", "segment")
 """Names of columns that are read as the direction of the stroke if the caller names no such column."""
 
-_SETPOINT = re.compile(r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll)(_|$)")
-"""Words of a column that holds what a controller requires, not what was measured."""
+_NOT_MEASURED = re.compile(
+    r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll|filt(ered)?)(_|$)"
+)
+"""Words of a column that holds what a controller requires, or a filtered and therefore late copy, not what
+was measured."""
 
 _EPOCH_S = (946_684_800.0, 4_102_444_800.0)
 """Seconds from 1970 to 2000 and to 2100. Times since 1970 between both have only one plausible unit."""
@@ -425,10 +428,10 @@ def _cure(
             added.append(f"--{role.name} {command_word(suggestion.name)}")
         roles[role.name] = suggestion.name
         if role.name not in units and (suggestion.unit is None or suggestion.unit.si not in role.si_units):
-            chosen = [
-                each.unit.si for each in columns if each.unit is not None and each.name in roles.values()
-            ]
-            unit = _likely_unit(role, suggestion, [*chosen, *(UNITS[each].si for each in units.values())])
+            with_unit = {each.name: each.unit.si for each in columns if each.unit is not None}
+            chosen = [si for name, si in with_unit.items() if name in roles.values()]
+            chosen += [UNITS[each].si for each in units.values()]
+            unit = _likely_unit(role, suggestion, chosen, with_unit.values())
             units[suggestion.name] = unit
             shown = UNIT_TO_FILL_IN if suggestion.stated else unit
             fill_in = fill_in or bool(suggestion.stated)
@@ -450,15 +453,17 @@ def _cure(
     return f". {condition}: {options}"
 
 
-def _likely_unit(role: Role, column: Column, known: Collection[str]) -> str:
+def _likely_unit(role: Role, column: Column, *known: Collection[str]) -> str:
     """Returns the unit that a message suggests for a column whose name states no unit.
 
-    `known` holds the SI units of the other columns.
+    `known` holds the SI units of the chosen columns, then those of all columns.
     """
     named, travel = column.named, column.look.largest - column.look.least
     possible = [si for si in role.si_units if named is None or si in named] or list(role.si_units)
-    lawful = [si for si in possible if any({si, other} == set(law) for law in LAWS for other in known)]
-    likely = (lawful or possible)[0]
+    likely = next(
+        (si for units in known for si in possible if any({si, other} in map(set, LAWS) for other in units)),
+        possible[0],
+    )
     units = _USUAL_UNITS.get(likely, (likely,))
     low, high = _USUAL_TRAVELS.get(likely, (0.0, math.inf))
     return next((unit for unit in units if low <= travel * UNITS[unit].factor <= high), units[0])
@@ -494,7 +499,7 @@ def _suggested(role: Role, columns: Sequence[Column]) -> Column | None:
             not (column.unit is not None and column.unit.si in role.si_units),
             column.look.steady,
             column.look.counter,
-            _SETPOINT.search(stem_key(column.stem)) is not None,
+            _NOT_MEASURED.search(stem_key(re.sub("(?<=[a-z])(?=[A-Z])", "_", column.stem))) is not None,
             column.named is None,
         )
 

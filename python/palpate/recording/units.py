@@ -146,8 +146,8 @@ _OF_OTHER_QUANTITIES = re.compile(
 
 _QUANTITIES: dict[tuple[str, ...], str] = {
     ("m", "rad", "count"): "pos disp depth indent height travel stroke compr exten deflec distance crosshead "
-    "gap weg hub course depla allonge despla carrera sposta corsa 変位",
-    ("rad", "count"): "angle winkel rotation ang_ theta phi encoder",
+    "gap weg hub course depla allonge despla carrera sposta corsa encoder 変位",
+    ("rad", "count"): "angle winkel rotation ang_ theta phi",
     ("N", "N*m"): "force load weight mass kraft fuerza forza carga carico 荷重 試験力",
     ("N*m",): "torque moment coppia",
     ("A",): "current strom amps",

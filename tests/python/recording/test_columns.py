@@ -136,7 +136,11 @@ def test_a_cure_suggests_the_likely_columns() -> None:
     )
     assert cure("t,F,x").startswith("--position x --units x=mm --force F --units F=N --time t")
     assert cure("count,pos,force_N", looks={"count": Look(counter=True)}) == "--position pos --units pos=mm"
+    assert cure("encoder,torque_Nm") == "--position encoder --units encoder=rad"
+    assert cure("encoder,force_N") == "--position encoder --units encoder=mm"
     assert cure("cmd_mm,actual_mm,force_N") == "--position actual_mm"
+    assert cure("PedalPosTarget_mm,PedalPosAct_mm,force_N") == "--position PedalPosAct_mm"
+    assert cure("depth_mm,Force_filt [N],Force_raw [N]") == "--force 'Force_raw [N]'"
 
 
 @pytest.mark.parametrize(

@@ -139,6 +139,8 @@ def test_units_are_listed_by_quantity() -> None:
         ("Load N", "Load", "N"),
         ("Force kg", "Force", "kgf"),
         ("travel_inches", "travel", "in"),
+        ("encoder_mm", "encoder", "mm"),
+        ("encoder_deg", "encoder", "deg"),
         ("force_g", "force", "gf"),
         ("Elapsed (sec.)", "Elapsed", "s"),
     ],
