@@ -161,7 +161,7 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
                 "without gaps"
             )
         X = X[rows]
-        outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
+        outside = np.asarray(((model.lower > X) | (model.upper < X)).any(axis=1))
         left_out = int(np.count_nonzero(~rows))
         notes = (NO_VELOCITY.format(left_out),) if left_out else ()
         return Prediction(rows, model.predict(X), outside, notes, recording.position[rows])
