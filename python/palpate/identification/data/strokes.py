@@ -256,9 +256,9 @@ def weights_behind_turns(
 ) -> Float1D:
     """Returns the weight (n,) of each row in a fit, from 0 to 1.
 
-    Friction reverses behind a turn in a way that a model with a direction state follows only roughly, and
-    the direction of a row next to a turn is uncertain. The n rows that are as far behind the turns at one end
-    share this error, of variance v_s, besides an error of variance v. Their weight is v / (v + n v_s).
+    Friction reverses behind a turn in a way that a model with a direction state follows only roughly. The n
+    rows that are as far behind the turns at one end share this error, of variance v_s, besides an error of
+    variance v. Their weight is v / (v + n v_s).
     v + v_s is their mean squared residual. v is that of rows as far before these turns, which are of the
     other stroke and have the same positions. A tool that leaves the object at one end shows walls and clicks
     near the other one, so that only rows next to its turns are weighted.
@@ -298,13 +298,11 @@ def weights_behind_turns(
         count = np.bincount(part, minlength=2 * FAR + 2)
         return np.bincount(part, square, 2 * FAR + 2) / np.where(count, count, np.nan)
 
-    of_all = float(np.mean(square[far]))
+    of_all, found = float(np.mean(square[far])), mean(behind)
     expected = np.fmax(mean(before), of_all)
-    expected[:: FAR + 1] = of_all
-    for part, found in ((behind, mean(behind)), (np.where(before % (FAR + 1), FAR, before), mean(before))):
-        shared = np.where(part % (FAR + 1) < FAR, np.fmax(found - expected, 0.0)[part], 0.0)
-        here = expected[part] / (expected[part] + shared * np.bincount(part)[part])
-        weight[moving] = np.minimum(weight[moving], here)
+    expected[:: FAR + 1] = of_all  # the direction of a row next to a turn is uncertain
+    shared = np.where(far, 0.0, np.fmax(found - expected, 0.0)[behind])
+    weight[moving] = expected[behind] / (expected[behind] + shared * np.bincount(behind)[behind])
     return weight
 
 

@@ -104,6 +104,21 @@ def test_rows_of_reversing_friction_do_not_make_a_steep_slope() -> None:
         assert slope.max() < 15.0  # the steepest of the object is 13.2
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_stop_at_which_the_tool_turns_keeps_its_slope(seed: int) -> None:
+    """A wheel is turned into both end stops, whose rows are next to the turns."""
+    corner = np.array([0.0, 460.0, -460.0, 460.0, -460.0, 0.0])
+    time = np.arange(0.0, 5.0, 0.0035)
+    part = time.astype(int)
+    x = corner[part] + np.diff(corner)[part] * (3.0 * (time - part) ** 2 - 2.0 * (time - part) ** 3)
+    stop = 0.7 * np.maximum(np.abs(x) - 450.0, 0.0) * np.sign(x)
+    force = 2.2 * np.tanh(x / 60.0) + 0.0044 * x + 0.8 * state(x, 1.15, 0.0) + stop
+    model = identify(np.round(x, 1), force + np.random.default_rng(seed).normal(0.0, 0.04, len(x)))
+    slopes = [float(model.slope(end, direction=way)) for end, way in ((459.0, 1.0), (-459.0, -1.0))]
+    assert model.verdict.level == "good"
+    assert min(slopes) > 0.6
+
+
 def test_wavelets_do_not_imitate_a_play_between_the_tried_radii() -> None:
     """Narrow wavelets fitted the reversals at the end of the travel: the slope of the release was five times
     the true one, and no play radius was found."""
