@@ -433,12 +433,12 @@ def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, st
         return {"period": f"the force repeats every {unit.text(model.period)}"}
     if len(model.inputs) > 1:
         return {}
-    leaves = " (the tool leaves)" if model.below == "free" else ""
-    low, high = (float(end[0]) for end in model.domain)
-    return {
-        "outside": f"below {unit.text(low)}: {CONTINUATIONS[model.below]}{leaves}; "
-        f"above {unit.text(high)}: {CONTINUATIONS[model.above]}"
-    }
+    ends = zip(("below", "above"), model.domain, (model.below, model.above), strict=True)
+    texts = (
+        f"{side} {unit.text(float(end[0]))}: {CONTINUATIONS[kind]}{' (the tool leaves)' * (kind == 'free')}"
+        for side, end, kind in ends
+    )
+    return {"outside": "; ".join(texts)}
 
 
 def _unit_of(role: str, model: Model, recordings: Sequence[Recording]) -> Unit:

@@ -388,7 +388,7 @@ def model_of(
         units=units,
         **network.parameters(),
         below=network.below,
-        above=options.above,
+        above=network.above,
         period=options.period,
         memory=None if network.memory is None else network.memory.memory(),
         play_radius=network.play_radius,

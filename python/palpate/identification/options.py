@@ -24,7 +24,7 @@ RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 CHOICES: dict[str, tuple[str, ...]] = {
     "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
     "below": ("auto", "free", "linear"),
-    "above": ("linear", "free"),
+    "above": ("auto", "linear", "free"),
 }
 """Options whose value is one of several words, and the allowed words of each."""
 
@@ -127,8 +127,9 @@ class IdentifyOptions:
     """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves.
     linear continues straight, because the object holds or attracts the tool. auto is free, unless the
     recording shows a pull."""
-    above: str = "linear"
-    """Force above the recorded positions: linear or free. linear continues straight, free falls to zero."""
+    above: str = "auto"
+    """Force above the recorded positions: linear, free or auto. auto is linear, unless the tool presses
+    towards smaller positions and leaves there."""
     search: SearchOptions = field(default_factory=SearchOptions)
     """Settings of the search, which few identifications need to change."""
 

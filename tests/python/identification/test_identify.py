@@ -216,6 +216,13 @@ def test_a_button_that_never_pulls_does_not_pull_below_the_recording(way: float)
     assert model.force(BELOW, direction=np.full(2, way)) == pytest.approx(0.0, abs=0.02)
 
 
+def test_a_button_that_is_pressed_towards_smaller_positions_is_the_mirror_image() -> None:
+    button = push_button()
+    model = identify(replace(button, position=-button.position, force=-button.force))
+    assert (model.below, model.above) == ("linear", "free")
+    assert model.force(-BELOW, direction=np.ones(2)) == pytest.approx(0.0, abs=0.02)
+
+
 def test_an_object_that_pulls_in_the_recording_continues_below_it() -> None:
     x = press_and_release(400) - 2.0
     f = 3.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))

@@ -348,13 +348,30 @@ def _floor(best: Candidate) -> float:
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
-def _pulls(best: Candidate, near_zero: float) -> bool:
-    """Returns True if the object pulls the tool in more than one row of each press, or of each release, that
-    passes the place of the pull. A zero that moves, or one stroke with the wrong sign, shows a pull that
-    other strokes do not show."""
+def _outside(best: Candidate, options: IdentifyOptions, into: float) -> tuple[str, float]:
+    """Returns the continuation below the domain for `into` = 1, above it for -1, and the distance [box] from
+    the end of the travel to the domain.
+
+    An object that is pressed towards smaller positions, with forces below zero, is the mirror image of one
+    that is pressed towards larger positions.
+    """
+    data, choice = best.data, options.below if into > 0.0 else options.above
+    if choice != "auto":
+        return choice, 0.0
+    near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
+    held = len(data.names) > 1 or data.period is not None
+    if held or _pulls(best, max(best.rmse, near_zero), into):
+        return "linear", 0.0
+    return "free", _first_contact(best, near_zero, into)
+
+
+def _pulls(best: Candidate, near_zero: float, into: float) -> bool:
+    """Returns True if the object, which is pressed in the direction `into`, pulls the tool in more than one
+    row of each press, or of each release, that passes the place of the pull. A zero that moves, or one stroke
+    with the wrong sign, shows a pull that other strokes do not show."""
     data, rows = best.data, np.flatnonzero(best.data.reported)
     direction = strokes_from_order(data.path[rows, 0]) if data.side is None else data.side[rows]
-    box, pulled = data.box[rows, 0], best.static_force[rows] < -near_zero
+    box, pulled = data.box[rows, 0], into * best.static_force[rows] < -near_zero
     if direction is None or not direction.any():
         return bool(np.count_nonzero(pulled) > 1)
     starts = np.flatnonzero(np.diff(direction, prepend=np.nan))
@@ -367,18 +384,19 @@ def _pulls(best: Candidate, near_zero: float) -> bool:
     return False
 
 
-def _first_contact(best: Candidate, near_zero: float) -> float:
-    """Returns the position [box] at which the domain of a force that the tool can leave starts: 0, or the end
-    of a pull that no row shows. Between few rows before the contact a network can pull; its continuation
-    does not."""
+def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
+    """Returns the distance [box] from the end of the travel to the domain of a force that the tool can leave:
+    0, or the end of a pull that no row shows. Between few rows before the contact a network can pull; its
+    continuation does not."""
     data = best.data
-    pressed = data.box[data.fitted & (best.static_force > near_zero), 0]
-    position = np.linspace(0.0, float(pressed.min()) if len(pressed) else 0.0, COMPARED_POSITIONS)
-    middle, half = best.parts_at(position[:, None])
-    least = middle - np.abs(half)
+    box = data.box[data.fitted & (into * best.static_force > near_zero), 0]
+    reached = float((box if into > 0.0 else 1.0 - box).min(initial=1.0)) if len(box) else 0.0
+    way = np.linspace(0.0, reached, COMPARED_POSITIONS)
+    middle, half = best.parts_at((way if into > 0.0 else 1.0 - way)[:, None])
+    least = into * middle - np.abs(half)
     if least.min() >= -_floor(best):
         return 0.0
-    return float(position[min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)])
+    return float(way[min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)])
 
 
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
@@ -402,7 +420,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings."""
     best, log, options = selection.best, selection.log, selection.options
     data, error, network = best.data, best.error, best.network
-    single, counted = len(data.names) == 1, error.weight
+    counted = error.weight
     notes, findings = list(data.log.notes), list(data.log.findings)
     decisions, replaced = latest([*log.decisions, *data.log.decisions])
     if data.period is not None:
@@ -428,17 +446,13 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             f"NRMSE {error.nrmse:.2g} on all rows, {settled.nrmse:.2g} with these weights."
         )
     band, checked = band_with_check(best)
-    below, lower = options.below, network.lower
-    if below == "auto":
-        near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
-        leaves = single and data.period is None and not _pulls(best, max(best.rmse, near_zero))
-        below = "free" if leaves else "linear"
-        if leaves:
-            lower = lower + data.reach[0] * _first_contact(best, near_zero)
+    (below, first), (above, last) = (_outside(best, options, into) for into in (1.0, -1.0))
     return replace(
         network,
         below=below,
-        lower=lower,
+        above=above,
+        lower=network.lower + data.reach * first,
+        upper=network.upper - data.reach * last,
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=replace(error, weight=share).rmse,

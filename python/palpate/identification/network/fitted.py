@@ -75,6 +75,8 @@ class FittedNetwork:
     """(d,) upper end of the domain"""
     below: str = "linear"
     """Continuation below the domain: "free" if the tool leaves the object there; otherwise linear"""
+    above: str = "linear"
+    """The same above the domain"""
     play_radius: float | None = None
     """Play radius [position]; None if the direction state is not from a play operator"""
     mass: float | None = None
@@ -180,6 +182,7 @@ class FittedNetwork:
         return replace(
             self,
             below="linear" if scale.offset else self.below,
+            above="linear" if scale.offset else self.above,
             bias=self.bias / factor + scale.offset,
             log=log,
             band=None if self.band is None else self.band.scaled(1.0 / factor),
