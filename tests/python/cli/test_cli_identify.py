@@ -455,7 +455,7 @@ def press_file(path: Path) -> Path:
     ("arguments", "below", "above"),
     [
         ([], "falls to zero (the tool leaves)", "continues straight"),
-        (["--below", "linear", "--above", "free"], "continues straight", "falls to zero"),
+        (["--below", "linear", "--above", "free"], "continues straight", "falls to zero (the tool leaves)"),
     ],
 )
 def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(

@@ -80,7 +80,7 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby; one step of the display is not a wrong reading. Several wrong readings side by side are outside
+    row nearby; one step of the display is not a wrong reading. Several of them side by side are outside
     the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows
     that are not in the order of a motion have no neighbours, and none is wrong. `motion` (m,) is the
     position of all rows in recorded order, of which these rows can be a part.
@@ -111,7 +111,7 @@ def _of_other_strokes(residual: Float1D, position: Float1D, rows: NDArray[np.boo
     if side is None:
         return np.zeros(len(x))
     number = np.cumsum(np.diff(side, prepend=0) != 0)
-    found = np.ma.masked_all((number[-1] + 1, len(x)))
+    found = np.full((number[-1] + 1, len(x)), np.nan)
     for stroke in np.unique(number[side != 0]):
         at = np.flatnonzero(number == stroke)
         at = at[np.argsort(position[at], kind="stable")]
@@ -119,7 +119,8 @@ def _of_other_strokes(residual: Float1D, position: Float1D, rows: NDArray[np.boo
         others = (side[rows] == side[at[0]]) & (number[rows] != stroke) & (above > 0) & (above < len(at))
         around = at[[above[others] - 1, above[others]]]
         found[stroke, others] = np.abs(residual[around]).max(axis=0)
-    return np.asarray(np.ma.median(found, axis=0).filled(0.0))
+    known = [column[np.isfinite(column)] for column in found.T]
+    return np.array([np.median(each) if len(each) else 0.0 for each in known])
 
 
 def _reach_and_least(values: Float1D) -> tuple[float, float]:
