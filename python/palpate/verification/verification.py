@@ -20,6 +20,7 @@ from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..model.band import BAND_LEVEL
 from ..recording import Recording, Source
+from ..recording.checks import quality_findings
 from ..recording.files import free_name
 from ..recording.reading import RecordingLike, recording_from
 from ..recording.units import COLUMN_SUFFIX, Unit
@@ -284,8 +285,12 @@ def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Fl
 
 
 def findings_of(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:
-    """Returns all findings of a verification."""
-    return (*error_findings(found.nrmse, f"{found.n} rows"), *circumstances(model, recording, found))
+    """Returns all findings of a verification; a defect of the recording limits what it shows of a model."""
+    return (
+        *error_findings(found.nrmse, f"{found.n} rows"),
+        *circumstances(model, recording, found),
+        *quality_findings(recording, attracts=model.below == "linear"),
+    )
 
 
 def circumstances(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:

@@ -545,3 +545,13 @@ def test_two_models_and_a_model_with_a_recording_are_judged_by_one_rule() -> Non
     (finding,) = noticed_findings(compare(other, model), *units)
     words = sentence.split(": up to ")[0]
     assert finding.sentence.startswith(words)
+
+
+def test_a_defect_of_the_fresh_recording_is_named() -> None:
+    x = np.tile(np.concatenate([np.linspace(0.0, 4.0, 300), np.linspace(4.0, 0.0, 300)]), 2)
+    noise = np.random.default_rng(5).normal(0.0, 0.01, (2, len(x)))
+    force = 0.2 * x**2
+    model = identify(x, force + noise[0])
+    assert verify(model, x, force + noise[1]).verdict.level == "good"
+    clipped = verify(model, x, np.minimum(force, 3.0) + np.where(force < 3.0, noise[1], 0.0))
+    assert any("the largest force, 3" in each for each in clipped.verdict.reasons)
