@@ -95,7 +95,8 @@ def wait_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if the force at rows that are not fitted differs much from the model.
 
     Between press and release any force is possible, and a position within its noise. Relaxation, creep and
-    drift are named only if the force changes after the first of successive rows.
+    drift are named only if the force of most rows differs from that of the first of successive rows: the last
+    one can be the first of the next stroke.
     """
     data = best.data
     unused = np.flatnonzero(~data.fitted)
@@ -112,7 +113,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
     if error <= USABLE_NRMSE * best.error.spread:
         return []
     begins = np.diff(unused, prepend=-2) > 1
-    change = float(np.sqrt(np.mean((force - force[begins][np.cumsum(begins) - 1]) ** 2)))
+    change = float(np.median(np.abs(force - force[begins][np.cumsum(begins) - 1])))
     reason = f"from the first row of each wait on it changes by {data.force_unit.text(change)}"
     if 2.0 * change > error:
         record = "" if data.parts else "record time, so that a memory can be identified, or "
