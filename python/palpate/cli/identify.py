@@ -433,11 +433,18 @@ def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, st
         return {"period": f"the force repeats every {unit.text(model.period)}"}
     if len(model.inputs) > 1:
         return {}
-    ends = zip(("below", "above"), model.domain, (model.below, model.above), strict=True)
-    texts = (
-        f"{side} {unit.text(float(end[0]))}: {CONTINUATIONS[kind]}{' (the tool leaves)' * (kind == 'free')}"
-        for side, end, kind in ends
-    )
+    force = _unit_of("force", model, recordings)
+    both = f"{force.shown}/{unit.shown}" if force.shown and unit.shown else ""
+    stiffness = Unit(both, both, force.factor / unit.factor)
+    way = {"direction": 1.0} if model.hysteretic else {}
+    texts = []
+    for side, end, out, kind in (
+        ("below", float(model.lower[0]), -1.0, model.below),
+        ("above", float(model.upper[0]), 1.0, model.above),
+    ):
+        slope = float(model.slope(end + out * float(np.ptp(model.domain)), **way))
+        how = f" with {stiffness.text(slope)}" if kind == "linear" else " (the tool leaves)"
+        texts.append(f"{side} {unit.text(end)}: {CONTINUATIONS[kind]}{how}")
     return {"outside": "; ".join(texts)}
 
 

@@ -454,8 +454,12 @@ def press_file(path: Path) -> Path:
 @pytest.mark.parametrize(
     ("arguments", "below", "above"),
     [
-        ([], "falls to zero (the tool leaves)", "continues straight"),
-        (["--below", "linear", "--above", "free"], "continues straight", "falls to zero (the tool leaves)"),
+        ([], "falls to zero (the tool leaves)", "continues straight with {above:.4g} N/mm"),
+        (
+            ["--below", "linear", "--above", "free"],
+            "continues straight with {below:.4g} N/mm",
+            "falls to zero (the tool leaves)",
+        ),
     ],
 )
 def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
@@ -469,4 +473,6 @@ def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
         "dropped (wrong readings): row 205: 0 N at 1.342 mm, row 215: 200 N at 1.611 mm. "
         "2 of 299 rows are not fitted: 2 wait in air\n"
     ) in printed
-    assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n" in printed
+    model = load_model("m.json")
+    slope = {side: 1e-3 * model.slope(at, direction=1.0) for side, at in (("below", -1.0), ("above", 1.0))}
+    assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n".format(**slope) in printed
