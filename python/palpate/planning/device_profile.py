@@ -174,9 +174,12 @@ def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) ->
 def require_unit(device: _core.device.DeviceProfile, unit: str) -> None:
     """Refuses a device that moves in another unit than a model. The unit of a model can be empty."""
     if unit not in ("", device.position_unit):
+        cure = f"the example profiles in {unit} are {_example_names(unit)}"
+        if unit == "count":
+            cure = "identify it with the step of the encoder: --units NAME=rev/4096 for 4096 steps a turn"
         raise InputError(
             f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
-            f"position unit of the model; the example profiles in {unit} are {_example_names(unit)}"
+            f"position unit of the model; {cure}"
         )
 
 

@@ -180,13 +180,16 @@ def unit_of(symbol: str) -> Unit | None:
 
     ``µm`` and ``microns`` are um, ``°`` is deg, ``inches`` is in. A mass (``g``, ``lbs``) is the force that
     is its weight. A force and a length (``N·m``, ``in-lb``, ``kgf.cm``) are a torque. Capital letters count
-    if they distinguish units (mN and MN). A unit of another quantity (``kPa``, ``mm/s``) has an SI unit that
-    no role has.
+    if they distinguish units (mN and MN). A step of an encoder is a part of a unit (``rev/4096``). A unit of
+    another quantity (``kPa``, ``mm/s``) has an SI unit that no role has.
     """
     text = " ".join(symbol.replace("µ", "u").replace("μ", "u").replace("·", "*").replace("⋅", "*").split())
     text = text.replace("∙", "*")
     if found := _simple(text) or _torque(text):
         return found
+    whole, _, parts = text.partition("/")
+    if (unit := _simple(whole.strip())) and re.fullmatch(r" ?[1-9]\d*", parts):
+        return Unit(f"({text})", unit.si, unit.factor / int(parts))
     first = re.split(r"[/^²³]|\*\*", text)[0]
     if _OF_OTHER_QUANTITIES.fullmatch(text) or (first != text and (unit_of(first) or not first)):
         return Unit.of_si(text)

@@ -11,6 +11,7 @@ import pytest
 from conftest import ROOT
 from palpate import DeviceProfile, InputError
 from palpate.cli.main import main
+from palpate.planning.device_profile import find_profile, require_unit
 
 MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
@@ -77,3 +78,8 @@ def test_the_message_on_a_profile_names_a_limited_number_of_fields(tmp_path: Pat
     with pytest.raises(InputError, match=r"k0 is not a key of this format; .*; and more$") as refused:
         DeviceProfile.load(file)
     assert len(str(refused.value)) < 1000 + len(str(file))
+
+
+def test_a_model_in_counts_is_refused_with_the_option_that_states_the_step() -> None:
+    with pytest.raises(InputError, match=r"must be count, .* --units NAME=rev/4096 for 4096 steps"):
+        require_unit(find_profile("smartknob"), "count")

@@ -66,6 +66,14 @@ def test_a_unit_has_its_si_unit_and_factor(symbol: str) -> None:
     assert UNITS[symbol].factor == pytest.approx(factor, rel=1e-15)
 
 
+@pytest.mark.parametrize(("symbol", "degrees"), [("rev/4096", 360.0 / 4096.0), ("deg / 10", 0.1)])
+def test_a_step_of_an_encoder_is_a_part_of_a_unit(symbol: str, degrees: float) -> None:
+    unit = unit_of(symbol)
+    assert unit is not None
+    assert unit.si == "rad"
+    assert unit.factor == pytest.approx(math.radians(degrees), rel=1e-15)
+
+
 def test_the_unit_is_the_text_after_the_last_underscore() -> None:
     assert split_name("tip_position_um") == ("tip_position", UNITS["um"])
     assert split_name("torque_Nm") == ("torque", UNITS["Nm"])
