@@ -21,7 +21,7 @@ from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.contact import contact_at
-from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order
+from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocity
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
 from ..log import Decision, Log, decided, lowered, squared_error_change
@@ -497,19 +497,24 @@ class _Compared:
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
         parts = recorded.recordings
         ends = np.cumsum([len(part) for part in parts])
-        several = len(found.lower) > 1
-        if found.residual is None or found.share is None or len(found.residual) != ends[-1] or several:
-            # some rows have no residual, such as those at gaps of time
-            return cls(np.array(1.0), np.array(1.0), found.rmse_of_all, found.settled_rmse)
-        residual, share = (
-            recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
-        )
         force, position = (
             recorded.fitted([getattr(part, name) for part in parts]) for name in ("force", "position")
         )
-        strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
-        outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
         moving = recorded.fitted([roles_of(part) == Role.MOVING for part in parts])
+        if "velocity" in found.inputs:
+            derived = [velocity(part) for part in parts]
+            speed, known = (recorded.fitted(list(each)) for each in zip(*derived, strict=True))
+            share, outside = known.astype(float), np.zeros(len(force))
+            residual = force - found.force(np.column_stack([position, speed]), None)
+        elif found.residual is None or found.share is None or len(found.residual) != ends[-1]:
+            # some rows have no residual, such as those at gaps of time
+            return cls(np.array(1.0), np.array(1.0), found.rmse_of_all, found.settled_rmse)
+        else:
+            residual, share = (
+                recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
+            )
+            strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
+            outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
         sure = share * (moving | (outside != 0.0)) * (np.abs(force) > recorded.near_zero)
         return cls(share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure))
 

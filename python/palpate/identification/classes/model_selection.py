@@ -146,6 +146,7 @@ class Velocity(ModelClass):
             data.force[rows],
             starts=(0,),
             weight=None if data.weight is None else data.weight[rows],
+            role=data.roles[rows],
             log=data.log,
             repeats=None if data.repeats is None else data.repeats.only(rows),
             position_unit=data.position_unit,

@@ -362,3 +362,21 @@ def test_one_branch_that_slips_is_the_play_operator_of_hysteresis(seed: int) -> 
     model = palpate.identify(position, with_noise(force, 0.003, seed), time=time)
     assert model.memory is None
     assert model.play_radius == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_network_of_velocity_is_judged_in_the_waits_of_a_pad_that_relaxes() -> None:
+    """The tool leaves the pad, whose branch the network replaces while the tool moves, but not in a wait."""
+    step, tau, ways = 0.02, 0.6, []
+    for speed in (0.5, 2.0, 8.0):
+        press = np.arange(-0.3, 3.7, speed * step)
+        ways += [np.full(75, -0.3), press, np.full(75, 3.7), press[::-1]]
+    x = np.concatenate([*ways, np.full(75, -0.3)])
+    branch = np.zeros(len(x))
+    for row in range(1, len(x)):
+        stretch = branch[row - 1] + max(x[row], 0.0) - max(x[row - 1], 0.0)
+        branch[row] = stretch / (1.0 + step / tau) if x[row] > 0.0 else 0.0
+    force = np.maximum(0.15 * np.maximum(x, 0.0) + 0.12 * branch, 0.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.003, len(x))
+    model = palpate.identify(x, force + noise, time=step * np.arange(len(x)))
+    assert (model.kind, model.verdict.level) == ("position_velocity", "usable")
+    assert any("wait in contact) the force differs from the model" in each for each in model.verdict.reasons)
