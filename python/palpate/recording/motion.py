@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion of a recording: direction of strokes, pieces on an even time grid, derivatives without delay.
 
-Velocity and acceleration are central differences, which have no phase. One low-pass L then runs forward and
-backward, which also has no phase. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
+Velocity and acceleration are central differences, which have no phase. A low-pass L without phase limits
+their noise. For the velocity as an input, and for the regression of mass and damping, L is two real poles,
+forward and backward: |L| = 1 / (1 + (w/w_c)^2)^2, which does not overshoot. For the forces of mass and
+damping, L is that of a quintic smoothing spline: L = 1 / (1 + (w/w_c)^6), which is flat below w_c
+(Woltring 1986).
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from .._core.dynamics import TransferFunction
@@ -421,6 +425,26 @@ class LowPass:
         return wide[mirrored : mirrored + len(signal)]
 
 
+@dataclass(frozen=True)
+class SplineLowPass(LowPass):
+    """Low-pass of a quintic smoothing spline. It multiplies the cosine series of a signal, which mirrors both
+    ends."""
+
+    def gain(self, frequency: Float1D) -> Float1D:
+        """Returns the gain L (k,) at frequencies (k,) [rad/s]."""
+        square = (frequency / self.cutoff) ** 2
+        return 1.0 / (1.0 + square * square * square)
+
+    def __call__(self, signal: Float1D, period: float) -> Float1D:
+        series = scipy.fft.dct(signal, norm="ortho") * self.gain(_phases(len(signal)) / period)
+        return np.asarray(scipy.fft.idct(series, norm="ortho"))
+
+
+def _phases(n: int) -> Float1D:
+    """Returns the frequencies (n,) of the cosine series of n samples [rad/time step]."""
+    return np.pi / n * np.arange(n)
+
+
 def pieces(recording: Recording) -> list[Piece]:
     """Divides the recording at its gaps in time; the grid step of each piece is the median time step.
 
@@ -476,16 +500,22 @@ LONGEST_LAG_S = 0.1
 """Longest lag of a force that is searched, and advised to be corrected [s]"""
 
 
+def position_noise(parts: Sequence[Piece]) -> float | None:
+    """Returns the variance of the noise of the position; None for a too short motion.
+
+    It is that of sixth differences of the position, because a hand's motion leaves almost nothing in them.
+    """
+    sixth = [np.diff(part.position, 6) for part in parts if len(part.position) > 6]
+    return float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6) if sixth else None
+
+
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     """Returns the low-pass with the highest cutoff that leaves at most NOISE_SHARE of noise in a derivative.
 
-    Sixth differences of the position estimate its noise, because a hand's motion leaves almost nothing in
-    them. The noise of the derivative follows from the impulse response of both filters.
+    The noise of the derivative follows from the impulse response of both filters.
     """
-    sixth = [np.diff(part.position, 6) for part in parts if len(part.position) > 6]
-    if not sixth:
+    if (noise := position_noise(parts)) is None:
         return None
-    noise = float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6)
     derive = (velocity_of, acceleration_of)[order - 1]
     duration = sum(part.period * len(part.time) for part in parts)
     low_pass = LowPass(HIGHEST_CUTOFF / parts[0].period)
@@ -508,50 +538,88 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     return None
 
 
+def least_error_low_pass(parts: Sequence[Piece], *, order: int) -> SplineLowPass | None:
+    """Returns the low-pass with the least expected error of a derivative, of those that leave at most
+    NOISE_SHARE of noise in it; None without one.
+
+    The expected squared error of the estimate L y is (1 - L)^2 y^2 + (2 L - 1) N, for a signal y with noise
+    of the variance N (Mallows 1973).
+    """
+    if (variance := position_noise(parts)) is None:
+        return None
+    period, power, noise, phases = parts[0].period, [], [], []
+    for part in parts:
+        # Noise that is cut off at an end has every frequency, therefore the window.
+        window, phase = np.hanning(len(part.time)), _phases(len(part.time))
+        derived = window * (part.velocity, part.acceleration)[order - 1]
+        power.append(scipy.fft.dct(derived, norm="ortho") ** 2)
+        gain = np.sin(phase) if order == 1 else 2.0 - 2.0 * np.cos(phase)
+        noise.append(np.mean(window**2) * gain**2)
+        phases.append(phase)
+    y, w = np.concatenate(power), np.concatenate(phases) / period
+    n = np.concatenate(noise) * variance / period ** (2 * order)
+    found, least = None, math.inf
+    low_pass = SplineLowPass(math.pi / period)
+    while long_enough(parts, low_pass):
+        gain = low_pass.gain(w)
+        error = float(np.sum((1.0 - gain) ** 2 * y + (2.0 * gain - 1.0) * n))
+        if error < least and gain**2 @ n <= NOISE_SHARE * float(gain**2 @ y):
+            found, least = low_pass, error
+        low_pass = SplineLowPass(CUTOFF_RATIO * low_pass.cutoff)
+    return found
+
+
 def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
     """Returns the pieces that are longer than their inaccurate samples at both ends after the low-pass."""
     return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
 
 
 def at_rows(
-    parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
+    parts: Sequence[Piece], low_pass: LowPass | None, order: int, n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns a low-passed derivative at the n rows of the pieces (n,), and True if it is accurate (n,)."""
+    """Returns the low-passed velocity (order 1) or acceleration (order 2) at the n rows of the pieces (n,),
+    and True if it is accurate (n,)."""
     result, defined = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    if low_pass is None:
+        return result, defined
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)
-        result[part.rows] = part.at_rows(low_pass(derive(part), part.period))
+        derived = (part.velocity, part.acceleration)[order - 1]
+        result[part.rows] = part.at_rows(low_pass(derived, part.period))
         first, last = part.time[margin], part.time[len(part.time) - 1 - margin]
         defined[part.rows] = (part.row_time >= first) & (part.row_time <= last)
     return result, defined
 
 
 def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the velocity [position unit per second] of each row (n,), and True for rows that have one (n,).
+    """Returns the velocity [position unit per second] of each row (n,) as an input, and True for rows that
+    have one (n,).
 
     Raises
     ------
     InputError
         The recording has no time, or its position is too noisy or too short to differentiate.
     """
-    return _derivative(recording, 1)
+    return _derivative(recording, 1, quiet_low_pass)
 
 
-def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the acceleration [position unit per second squared] of each row, and True for rows with one.
+def derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Returns the velocity (order 1) or acceleration (order 2) of each row (n,) with the least expected
+    error, and True for rows that have one (n,).
 
     It raises the same errors as :func:`velocity`.
     """
-    return _derivative(recording, 2)
+    return _derivative(recording, order, least_error_low_pass)
 
 
-def _derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.bool_]]:
+def _derivative(
+    recording: Recording, order: int, choose: Callable[..., LowPass | None]
+) -> tuple[Float1D, NDArray[np.bool_]]:
     parts = pieces(recording)
-    low_pass = quiet_low_pass(parts, order=order)
+    low_pass = choose(parts, order=order)
     if low_pass is None:
         raise InputError(
             f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from {len(recording)} rows: "
             "the pieces between gaps in time are too short, or the noise of the position is too large"
         )
-    derive = (lambda part: part.velocity) if order == 1 else (lambda part: part.acceleration)
-    return at_rows(parts, low_pass, derive, len(recording))
+    return at_rows(parts, low_pass, order, len(recording))

@@ -20,12 +20,11 @@ from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
 from ..recording.motion import (
-    acceleration,
+    derivative,
     gaps_of,
     ordered_strokes,
     states_its_order,
     turns_of,
-    velocity,
 )
 from ..recording.roles import Role, roles_of, unused_rows
 
@@ -138,9 +137,9 @@ def _moving(model: Model, recording: Recording, play_radius: float | None) -> Pr
         )
     static = _static(model, recording, play_radius)
     total, known = np.zeros(len(recording)), np.ones(len(recording), dtype=bool)
-    for value, derivative in ((model.damping, velocity), (model.mass, acceleration)):
+    for order, value in enumerate((model.damping, model.mass), start=1):
         if value is not None:
-            derived, here = derivative(recording)
+            derived, here = derivative(recording, order)
             total, known = total + value * derived, known & here
     rows = static.rows & known
     force = (static.force + total[static.rows])[known[static.rows]]

@@ -9,7 +9,8 @@ independent samples is computed from their autocorrelation.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +22,7 @@ from ...recording.motion import (
     LowPass,
     Piece,
     at_rows,
+    least_error_low_pass,
     long_enough,
     quiet_low_pass,
 )
@@ -34,7 +36,10 @@ from ..options import IdentifyOptions
 from ..search.evidence import CRITERIA, CRITERION_NAMES, LEAST_GAIN, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
-"""Number of sections of the recording for a test of damping and mass; each section is held out once."""
+"""Number of groups of sections of the recording for a test of damping and mass; each group is held out once.
+
+A group is every tenth of a hundred sections, so that it has slow and fast strokes, even if the speed rises
+over the recording."""
 
 TERMS = ("damping", "mass")
 """Names of the coefficients of velocity (damping) and of acceleration (mass)."""
@@ -223,32 +228,32 @@ class Dynamics:
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
 
     def moving(self, values: dict[str, float]) -> Moving:
-        """Returns given mass m and damping B with their force m L a + B L v at every row, with acceleration
-        a, velocity v and low-pass filter L."""
+        """Returns given mass m and damping B with their force m a + B v at every row. Acceleration a and
+        velocity v have the least expected error, because the force that is fitted next is not low-passed."""
         total, known = np.zeros(len(self._data.force)), np.ones(len(self._data.force), dtype=bool)
-        for name, derive in (
-            ("damping", lambda part: part.velocity),
-            ("mass", lambda part: part.acceleration),
-        ):
+        for name, (derived, here) in zip(TERMS, self._derivatives, strict=True):
             if name in values:
-                derived, here = self._at_rows(derive)
                 total, known = total + values[name] * derived, known & here
         return Moving(values.get("damping"), values.get("mass"), total, known.astype(float))
 
-    def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
-        """Returns the filtered velocity at every row (n,), and True (n,) for rows that have a velocity."""
-        return self._at_rows(lambda part: part.velocity)
+    @cached_property
+    def _derivatives(self) -> tuple[tuple[Float1D, NDArray[np.bool_]], ...]:
+        """Velocity and acceleration at every row (n,), each with True (n,) for the rows that have one"""
+        parts, n = self._data.parts, len(self._data.force)
+        return tuple(at_rows(parts, least_error_low_pass(parts, order=order), order, n) for order in (1, 2))
 
-    def _at_rows(self, derive: Callable[[Piece], Float1D]) -> tuple[Float1D, NDArray[np.bool_]]:
-        return at_rows(self._parts, self._low_pass, derive, len(self._data.force))
+    def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
+        """Returns the velocity at every row (n,) as an input, and True (n,) for rows that have one."""
+        return at_rows(self._parts, self._low_pass, 1, len(self._data.force))
 
     def share_of_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
         """Returns the share of the mean square of a residual (n,) that functions of velocity and position
         explain.
 
-        The functions are v|v|, and v times 1, x and psi_i(x), with velocity v, position x and the wavelets
-        psi_i of the force. With `friction`, functions with the smoothed sign of v in place of v are added,
-        and the share is corrected for the number of functions.
+        The functions are v|v|, and 1, x and psi_i(x), also times v and |v|, with velocity v, position x and
+        the wavelets psi_i of the force: damping can differ between press and release. With `friction`, the
+        smoothed sign of v times 1, x and psi_i(x) is added. The share is corrected for the number of
+        functions.
         """
         velocity, known = self.velocity()
         rows = evenly_spread(np.flatnonzero(known))
@@ -256,15 +261,13 @@ class Dynamics:
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
         over_x = np.concatenate([np.ones_like(x), x, basis.columns(x)], 1)
-        columns = [v * np.abs(v), v * over_x]
+        columns = [over_x, v * np.abs(v), v * over_x, np.abs(v) * over_x]
         if friction:
             slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(v * v)))
             columns.append(np.tanh(v / slow) * over_x)
         table = np.concatenate(columns, 1)
         product = table.T @ r
         share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))
-        if not friction:
-            return share
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
 
     def _regression(self, basis: Basis, strokes: HysteresisInput | None) -> FoldedRegression | None:
@@ -285,7 +288,7 @@ class Dynamics:
                 variance = 1.0 / np.maximum(part.on_grid(strokes.share[part.rows]), LEAST_SHARE)
                 root = 1.0 / np.sqrt(np.maximum(self._filtered(part, variance[:, None]), 1.0))
             tables.append(root * np.concatenate([fixed, self._filtered(part, plain)], axis=1))
-            folds.append((np.arange(done, done + len(fixed)) * FOLDS) // rows)
+            folds.append((np.arange(done, done + len(fixed)) * FOLDS**2) // rows % FOLDS)
             done += len(fixed)
         if not tables:
             return None

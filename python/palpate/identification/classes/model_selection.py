@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +17,17 @@ from ..data.limits import (
     innovation_deviance,
 )
 from ..data.rows import Rows
-from ..log import decided, in_words, lowered
+from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
-from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
+from .class_selection import (
+    REGROWTH_ERROR_RATIO,
+    VELOCITY_INPUTS,
+    ClassSelection,
+    Linear,
+    ModelClass,
+    Network,
+)
 from .findings import USABLE_NRMSE
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
@@ -91,26 +99,41 @@ class MassAndDamping(ModelClass):
         return selection.motion is not None
 
     def better(self, below: Candidate) -> Candidate:
+        """Returns the candidate with mass and damping if they are accepted, else the simpler candidate.
+
+        Wavelets that fit inertia hide a part of it. Mass and damping are fitted again with the wavelets of
+        the last selection until their force no longer changes the error.
+        """
         selection, motion, data = self._selection, self._selection.motion, self._selection.data
         assert motion is not None
-        values, decisions = motion.accepted(below.solution.basis, below.strokes)
-        selection.log.decisions.extend(decisions)
-        if not values or min(values.values()) <= 0.0:
-            return below  # a passive object has no negative mass or damping
-        moving = motion.moving(values)
-        weight = moving.known if data.weight is None else moving.known * data.weight
-        again = selection.repeated(replace(data, force=data.force - moving.force, weight=weight))
-        note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
-        selection.log.follow(again.log, [note])
-        return selection.recorded(
-            replace(
+        found, log, change = below, Log(), math.inf
+        while True:
+            values, decisions = motion.accepted(found.solution.basis, found.strokes)
+            moving = motion.moving(values)
+            if not values or min(values.values()) <= 0.0 or not moving.known.any():
+                found = below  # a passive object has no negative mass or damping
+                break
+            step = moving.force - (0.0 if found.moving is None else found.moving.force)
+            last, change = change, float(np.sqrt(np.mean(step[moving.known > 0.0] ** 2)))
+            settled = math.hypot(found.rmse, change) <= REGROWTH_ERROR_RATIO * found.rmse
+            if found is not below and (settled or change >= last):
+                break
+            weight = moving.known if data.weight is None else moving.known * data.weight
+            again = selection.repeated(replace(data, force=data.force - moving.force, weight=weight))
+            log = again.log
+            found = replace(
                 again.best,
                 model_class="velocity" if moving.mass is None else "mass and damping",
                 data=data,
                 n_parameters=again.best.n_parameters + len(values),
                 moving=moving,
             )
-        )
+        selection.log.decisions.extend(decisions)
+        if found is below:
+            return below
+        note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
+        selection.log.follow(log, [note])
+        return selection.recorded(found)
 
 
 class Velocity(ModelClass):

@@ -2,20 +2,23 @@
 """Velocity, mass, damping and hysteresis are identified only if they are present."""
 
 import os
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from conftest import sampled
+from imperfect import Array
 from palpate import Model, Recording, identify, read_recording, verify
 from palpate._core.model import play
 from palpate.identification.classes.dynamics import Dynamics
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
-    acceleration,
     acceleration_of,
+    derivative,
     pieces,
     quiet_low_pass,
     velocity,
@@ -74,7 +77,7 @@ def test_a_pull_that_the_force_of_a_mass_hides_is_part_of_the_model() -> None:
 
 def test_mass_and_damping_are_recovered_from_one_recording() -> None:
     for seed in range(1 if SCALE == 1 else 20):
-        recording = moved(seed, seconds=6.0 * SECONDS, mass=1e-3, damping=0.06)
+        recording = moved(seed, seconds=8.0 * SECONDS, mass=1e-3, damping=0.06)
         model = identify(recording)
         assert (model.kind, model.fit.model_class) == ("position", "mass and damping")
         assert model.mass == pytest.approx(1e-3, rel=0.05)
@@ -301,7 +304,12 @@ def test_the_derivatives_of_a_noisy_position_are_those_of_the_motion() -> None:
     x = np.sin(4.0 * t)
     noisy = np.round(x / 1e-4) * 1e-4
     recording = Recording.from_arrays(noisy, noisy, time=t)
-    for derived, true in ((velocity(recording), 4.0 * np.cos(4.0 * t)), (acceleration(recording), -16.0 * x)):
+    speed = 4.0 * np.cos(4.0 * t)
+    for derived, true in (
+        (velocity(recording), speed),
+        (derivative(recording, 1), speed),
+        (derivative(recording, 2), -16.0 * x),
+    ):
         values, known = derived
         assert known.mean() > 0.9
         error = values[known] - true[known]
@@ -313,6 +321,68 @@ def test_central_differences_have_no_phase() -> None:
     x = np.sin(30.0 * t)
     assert abs(np.sum(velocity_of(x, 1e-3)[5:-5] * x[5:-5])) < 1e-2 * np.sum(np.abs(x)) * 30.0
     np.testing.assert_allclose(acceleration_of(x, 1e-3)[5:-5], -900.0 * x[5:-5], rtol=1e-3, atol=1e-6)
+
+
+def test_an_acceleration_near_the_sampling_rate_keeps_its_amplitude() -> None:
+    """Motion of 7 Hz, sampled at 100 Hz by an encoder."""
+    t = np.arange(1000) / 100.0
+    x = np.sin(14.0 * np.pi * t)
+    recording = Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, x, time=t)
+    values, known = derivative(recording, 2)
+    true = acceleration_of(x, 0.01)[known]
+    assert np.std(values[known] - true) < 0.01 * true.std()
+
+
+def driven(seed: int, friction: float) -> Recording:
+    """Returns a soft centring spring with inertia, damping and friction, shaken at up to 7 Hz."""
+    random = np.random.default_rng(seed)
+    t = np.arange(2000) / 500.0
+    waves = zip((0.5, 2.8, 7.0), (0.8, 0.15, 0.06), random.uniform(0.0, 6.0, 3), strict=True)
+    x = np.sum([size * np.sin(2.0 * np.pi * rate * t + phase) for rate, size, phase in waves], axis=0)
+    force = 3.0 * np.tanh(x / 0.8) + 0.12 * np.gradient(x, t) + 0.045 * acceleration_of(x, 0.002)
+    force += friction * np.clip((x - play(x, 0.01)) / 0.01, -1.0, 1.0)
+    force += random.normal(0.0, 0.03, len(x))
+    return Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=t)
+
+
+@pytest.mark.parametrize("friction", sampled([0.0, 0.25], 0.25))
+def test_inertia_of_a_fast_motion_leaves_only_noise(friction: float) -> None:
+    model = identify(driven(1, friction))
+    assert model.kind == ("hysteresis" if friction else "position")
+    assert (model.mass, model.damping) == (pytest.approx(0.045, rel=0.01), pytest.approx(0.12, rel=0.02))
+    for seed in (1, 11):
+        assert verify(model, driven(seed, friction)).rmse < 0.036  # noise 0.03
+
+
+def stroked(law: Callable[[Array, Array], Array], speeds: Sequence[float], noise: float) -> Recording:
+    """Returns a recording of a force of position and velocity; the travel is 1, each stroke has one speed."""
+    path = np.cumsum(np.repeat(speeds, [round(200.0 / speed) for speed in speeds])) / 200.0
+    x = np.abs((path + 1.0) % 2.0 - 1.0)
+    soft = np.hanning(9) / np.hanning(9).sum()
+    x = np.convolve(np.pad(x, 4, "edge"), soft, "valid")
+    time, random = np.arange(len(x)) / 200.0, np.random.default_rng(1)
+    force = law(x, np.gradient(x, time)) + random.normal(0.0, noise, len(x))
+    return Recording.from_arrays(x + random.normal(0.0, 1e-5, len(x)), force, time=time)
+
+
+def test_damping_that_differs_between_press_and_release_makes_velocity_an_input() -> None:
+    """Shock absorbers have more damping in rebound than in compression."""
+    speeds = (0.2, 0.2, 0.4, 0.4, 0.8, 0.8)
+    model = identify(stroked(lambda x, v: 4.0 * x + np.where(v > 0.0, 0.3, 0.9) * v, speeds, 0.02))
+    assert model.kind == "position_velocity"
+    assert "the zero of the force or the object changed" not in str(model.verdict)
+
+
+def test_damping_is_accepted_although_the_speed_rises_over_the_recording() -> None:
+    """Each tenth of the recording has one speed, and friction falls with the speed (Stribeck)."""
+
+    def joint(x: Array, v: Array) -> Array:
+        friction = np.clip((x - play(x, 0.002)) / 0.002, -1.0, 1.0) * (2.0 + 1.5 * np.exp(-((v / 0.4) ** 2)))
+        return 8.0 * np.sin(x) + friction + 1.5 * v
+
+    speeds = np.repeat([0.2, 0.6, 1.2, 2.0, 3.0], 2)
+    decisions = identify(stroked(joint, speeds, 0.15), max_wavelets=4).notes["model_selection"]
+    assert any(line.startswith("damping: accepted") for line in decisions)
 
 
 def test_a_position_that_is_all_noise_has_no_low_pass() -> None:
