@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.checks import findings_of
-from ...recording.motion import noise_band, strokes_from_order
+from ...recording.motion import TURN_SHARE, noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
-from ..data.rows import period_notes
+from ..data.rows import Rows, period_notes
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
@@ -25,6 +25,7 @@ from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, deviance
 from .class_selection import VELOCITY_INPUTS, ClassSelection
+from .dynamics import LEAST_SPEED_SPREAD, spread_of_speeds
 from .repeatability import band_with_check, left_out_residual
 from .shift import shift_of
 
@@ -141,6 +142,36 @@ MOST_JND = 2.0
 """Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
 
 
+PARTS = 10
+"""Number of parts of the travel; in each of them strokes can differ by another force."""
+
+FASTER = (
+    "at the same position and stroke the force {} with the speed of the stroke, from the slowest to the "
+    "fastest by {}: it depends on the velocity, or the object changed at the same time. Alternate slow "
+    "and fast strokes"
+)
+"""Finding on strokes that differ by their speed, with the way of the change and its size."""
+
+TURNED = (
+    "at the same position and stroke the force {} with the position of the last turn, by {}. Identify the "
+    "cycles of each amplitude separately, with --rows"
+)
+"""Finding on strokes that differ by the turn before them."""
+
+FIRST = (
+    "behind the first stroke over a position the force there {} by {}: the object or the zero of the force "
+    "changed. Press the object several times before the recording, or leave out the first strokes with --rows"
+)
+"""Finding on a first stroke that differs from the later ones."""
+
+LATER = (
+    "from the first row to the last the force at the same position and stroke {} by {}: the zero of the "
+    "force or the object changed. Let both warm up, do not set the force to zero during the recording, or "
+    "identify the parts of the recording separately with --rows"
+)
+"""Finding on strokes that differ by their time."""
+
+
 def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
     """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
     place = np.minimum((box[:, 0] * PLACES).astype(np.intp), PLACES - 1)
@@ -176,6 +207,26 @@ class _Strokes:
         group = _places(best.data.box[rows], direction[rows])
         number = np.cumsum(np.diff(direction[rows], prepend=0) != 0) - 1
         return cls(rows, best.settled.weight[rows], group, number)
+
+    def properties(self, data: Rows) -> Iterator[tuple[str, Float1D, float]]:
+        """Yields the properties in which strokes over the same place can differ: a sentence, the value (k,)
+        of each row, and the change of the value whose effect the sentence states."""
+        index, starts, rows = np.unique(self.number, return_index=True, return_counts=True)
+        begin = self.rows[starts][self.number]
+        end = self.rows[starts + rows - 1][self.number]
+        if data.parts:
+            time = np.concatenate([piece.row_time for piece in data.parts])
+            distance = np.abs(data.path[end, 0] - data.path[begin, 0])
+            speed = distance / np.maximum(time[end] - time[begin], TINY)
+            if spread_of_speeds(speed) >= LEAST_SPEED_SPREAD:
+                yield FASTER, speed, float(np.ptp(speed))
+        turn = data.path[begin, 0]
+        if (moved := float(np.ptp(self.centred(turn)))) > TURN_SHARE:
+            yield TURNED, turn, moved
+        earliest = np.full(2 * PLACES, len(index))
+        np.minimum.at(earliest, self.group, self.number)
+        yield FIRST, (self.number > earliest[self.group]).astype(float), 1.0
+        yield LATER, 0.5 * (begin + end) / len(data.force), 1.0
 
     def centred(self, values: Float1D) -> Float1D:
         """Returns values (k,) minus their weighted mean at each place and direction."""
@@ -315,33 +366,38 @@ def energy_findings(best: Candidate) -> list[Finding]:
 
 
 def drift_findings(best: Candidate) -> list[Finding]:
-    """Returns a finding if the residual changes over the recording by more than a just noticeable difference,
-    between strokes in the same direction over the same place. One press and release cannot show this."""
+    """Returns a finding if strokes in the same direction over the same place differ by more than a just
+    noticeable difference. One press and release cannot show this.
+
+    The residuals are fitted over each property of the strokes, with a slope for each part of the travel: a
+    difference that varies over the travel is not noise. The property that explains most is named.
+    """
     data = best.data
     if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
         return []
-    rows, number, weight = strokes.rows, strokes.number, strokes.weight
-    middle = (np.bincount(number, rows) / np.bincount(number))[number] / len(data.force)
-    moment, residual = strokes.centred(middle), strokes.centred(best.residual[rows])
-    squares = float(weight @ moment**2)
-    if not squares > np.finfo(float).eps * len(rows):
+    rows, weight, residual = strokes.rows, strokes.weight, strokes.centred(best.residual[strokes.rows])
+    part, least = strokes.group * PARTS // PLACES, np.finfo(float).eps * len(rows)
+    free = len(rows) - len(np.unique(strokes.group)) - len(np.unique(part))
+    found = []
+    for reason, values, span in strokes.properties(data) if free > 0 else ():
+        moment = strokes.centred(values)
+        cross, square = (np.bincount(part, weight * moment * each) for each in (residual, moment))
+        if not square.sum() > least:
+            continue
+        slope = np.divide(cross, square, out=np.zeros_like(cross), where=square > least)
+        noise = residual - slope[part] * moment
+        left, change = float(weight @ noise**2), float(cross.sum() / square.sum()) * span
+        independent = max(1.0, free * (1.0 - max(neighbour_correlation(noise), 0.0)))
+        excess = abs(change) - PLACE_ERRORS * span * float(np.sqrt(left / square.sum() / independent))
+        if excess > _floor(best):
+            found.append((left, reason, change, excess / _floor(best)))
+    if not found:
         return []
-    change = float((weight * moment) @ residual) / squares
-    noise = residual - change * moment
-    independent = max(1.0, len(rows) * (1.0 - max(neighbour_correlation(noise), 0.0)))
-    error = float(np.sqrt(weight @ noise**2 / squares / independent))
-    excess, least = abs(change) - PLACE_ERRORS * error, _floor(best)
-    if excess <= least:
-        return []
-    return [
-        usable(
-            "from the first row to the last the force at the same position and stroke "
-            f"{'rises' if change > 0.0 else 'falls'} by {data.force_unit.text(abs(change))}, "
-            f"{excess / least:.2g} just noticeable differences: the zero of the force or the object changed. "
-            "Let both warm up, do not set the force to zero during the recording, or identify the parts of "
-            "the recording separately with --rows"
-        )
-    ]
+    # All properties of two strokes explain the same: the first of them in the list is named.
+    most = min(left for left, *_ in found) + least * float(weight @ residual**2)
+    _, reason, change, noticed = next(each for each in found if each[0] <= most)
+    difference = f"{data.force_unit.text(abs(change))}, {noticed:.2g} just noticeable differences"
+    return [usable(reason.format("rises" if change > 0.0 else "falls", difference))]
 
 
 def _floor(best: Candidate) -> float:

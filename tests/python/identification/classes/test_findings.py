@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reported error is the error of the rows; findings name forces that no input explains."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +152,44 @@ def test_a_zero_that_cannot_be_felt_to_move_gives_no_finding(count: int, drift: 
     """One press and release cannot show the movement, and 0.02 is below a just noticeable difference."""
     verdict = str(palpate.identify(cycles(count, drift)).verdict)
     assert "the zero of the force or the object changed" not in verdict
+
+
+def conditioned(count: int, loss: float) -> palpate.Recording:
+    """Returns presses and releases of an elastomer whose first press is harder than the others (Mullins)."""
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)], count)
+    reached = np.maximum.accumulate(x)
+    soft = 1.0 - loss * ((reached - x) / np.maximum(reached, 0.01)) ** 0.6
+    force = 20.0 * (x + 0.8 * x**3) * soft + np.random.default_rng(8).normal(0.0, 0.02, len(x))
+    return palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x)))
+
+
+@pytest.mark.parametrize(("count", "loss"), sampled([(2, 0.3), (5, 0.3), (2, 0.01)], (2, 0.3), (5, 0.3)))
+def test_a_first_press_that_differs_from_the_others_is_named(count: int, loss: float) -> None:
+    verdict = str(palpate.identify(conditioned(count, loss)).verdict)
+    assert ("behind the first stroke over a position the force there falls by" in verdict) == (loss > 0.01)
+
+
+def test_strokes_that_differ_by_their_speed_are_not_only_called_a_changed_object() -> None:
+    """The strokes become faster, and velocity is not among the inputs."""
+    x = np.concatenate([np.r_[np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)] for n in (200, 100, 50)])
+    time = 0.01 * np.arange(len(x))
+    force = 4.0 * x + 0.2 * np.abs(np.gradient(x, time)) + np.random.default_rng(8).normal(0.0, 0.02, len(x))
+    recording = palpate.Recording.from_arrays(x, force, time=time)
+    (reason,) = palpate.identify(recording, inputs=("position", "hysteresis")).verdict.reasons
+    assert "from the slowest to the fastest by 0.3" in reason
+    assert "Alternate slow and fast strokes" in reason
+
+
+def test_strokes_that_differ_by_their_amplitude_are_not_called_a_changed_object() -> None:
+    """Friction of plays in parallel grows with the distance from the last turn."""
+    turns = np.array([0.0, 1.0, 0.1, 0.9, 0.2, 0.8, 0.3])
+    x = np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(turns)])
+    away = np.abs(x - np.repeat(turns[:-1], 100))
+    side = np.repeat(np.sign(np.diff(turns)), 100)
+    force = 5.0 * x + side * away + np.random.default_rng(8).normal(0.0, 0.01, len(x))
+    verdict = str(palpate.identify(palpate.Recording.from_arrays(x, force, direction=side)).verdict)
+    assert "or the object changed" not in verdict
+    assert "the force falls with the position of the last turn, by 0.2" in verdict
 
 
 DATA = measured_data() or Path("no measured data")
