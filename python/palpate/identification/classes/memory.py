@@ -374,17 +374,9 @@ def better_with_memory(
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
-    n_parameters = network.n_parameters + refined.n_parameters
-
-    def fall_of_bic(square: float, by_memory: float, rows: float) -> float:
-        """Returns the fall of BIC from the mean square of the model without memory to that with it."""
-        n = min(found.independent_rows, rows)
-        errors = (square, found.n_parameters), (by_memory, n_parameters)
-        return -float(np.diff([deviance("bic", n * each, n, p) for each, p in errors])[0])
-
-    squares = compared.rmse_where_sure**2, where_sure**2
-    fewer = over_velocity and fall_of_bic(*squares, float(np.sum(compared.sure > 0.0))) > 0.0
-    if squares[1] > (1.0 + LEAST_GAIN) * squares[0] and not fewer:
+    # A network of velocity, which is as hard to render, is not preferred to a memory that is good in motion.
+    allowed = USABLE_NRMSE * recorded.spread if over_velocity else 0.0
+    if where_sure**2 > max((1.0 + LEAST_GAIN) * compared.rmse_where_sure**2, allowed**2):
         # The pauses of friction that creeps would accept a model that is wrong while the tool moves.
         change = recordings[0].file_unit("force").interval(compared.rmse_where_sure, where_sure)
         return _refused(
@@ -395,11 +387,14 @@ def better_with_memory(
     left_out_nrmse = float(np.sqrt(held_out.mean()))
     gain = 1.0 - max(error / recorded.spread, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
+    n_parameters = network.n_parameters + refined.n_parameters
     text = _gain_text(gain, scatter)
     accepted = gain - scatter >= LEAST_GAIN
     if over_velocity:
         # Both are as hard to render. At one speed both fit the same recording, a branch with fewer numbers.
-        falls = fall_of_bic(before, before * (1.0 - gain), fit.n_rows)
+        n = min(found.independent_rows, fit.n_rows)
+        errors = (before, found.n_parameters), (before * (1.0 - gain), n_parameters)
+        falls = -float(np.diff([deviance("bic", n * square, n, p) for square, p in errors])[0])
         text = f"{lowered('BIC', falls)}, must lower it by at least {options.search.evidence:.4g}"
         accepted = falls >= options.search.evidence
     if not accepted:

@@ -364,8 +364,8 @@ def test_one_branch_that_slips_is_the_play_operator_of_hysteresis(seed: int) -> 
     assert model.play_radius == pytest.approx(0.01, rel=0.05)
 
 
-def test_a_network_of_velocity_is_judged_in_the_waits_of_a_pad_that_relaxes() -> None:
-    """The tool leaves the pad, whose branch the network replaces while the tool moves, but not in a wait."""
+def left_pad() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns time, position and force of a pad with one branch that the tool leaves between its presses."""
     step, tau, ways = 0.02, 0.6, []
     for speed in (0.5, 2.0, 8.0):
         press = np.arange(-0.3, 3.7, speed * step)
@@ -376,7 +376,23 @@ def test_a_network_of_velocity_is_judged_in_the_waits_of_a_pad_that_relaxes() ->
         stretch = branch[row - 1] + max(x[row], 0.0) - max(x[row - 1], 0.0)
         branch[row] = stretch / (1.0 + step / tau) if x[row] > 0.0 else 0.0
     force = np.maximum(0.15 * np.maximum(x, 0.0) + 0.12 * branch, 0.0)
-    noise = np.random.default_rng(0).normal(0.0, 0.003, len(x))
-    model = palpate.identify(x, force + noise, time=step * np.arange(len(x)))
+    return step * np.arange(len(x)), x, force + np.random.default_rng(0).normal(0.0, 0.003, len(x))
+
+
+def test_a_pad_that_the_tool_leaves_gets_a_memory() -> None:
+    """A network of position and velocity fits the motion as well, but not the waits."""
+    time, x, force = left_pad()
+    model = palpate.identify(x, force, time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.6], rtol=0.15)
+    held = x == x.max()
+    error = (model.force_over_time(time, x)[0] - force)[held]
+    assert np.sqrt(np.mean(error**2)) < 0.05 * np.ptp(force[held])
+
+
+def test_a_network_of_velocity_is_judged_in_the_waits() -> None:
+    """Limits of the slope exclude a memory."""
+    time, x, force = left_pad()
+    model = palpate.identify(x, force, time=time, slope_bounds=(-10.0, 10.0))
     assert (model.kind, model.verdict.level) == ("position_velocity", "usable")
     assert any("wait in contact) the force differs from the model" in each for each in model.verdict.reasons)
