@@ -437,12 +437,12 @@ class SplineLowPass(LowPass):
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
         series = scipy.fft.dct(signal, norm="ortho") * self.gain(_phases(len(signal)) / period)
-        return np.asarray(scipy.fft.idct(series, norm="ortho"))
+        return np.asarray(scipy.fft.idct(series, norm="ortho"), dtype=np.float64)
 
 
 def _phases(n: int) -> Float1D:
     """Returns the frequencies (n,) of the cosine series of n samples [rad/time step]."""
-    return np.pi / n * np.arange(n)
+    return np.pi / n * np.arange(n, dtype=np.float64)
 
 
 def pieces(recording: Recording) -> list[Piece]:

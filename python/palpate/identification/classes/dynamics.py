@@ -250,10 +250,10 @@ class Dynamics:
         """Returns the share of the mean square of a residual (n,) that functions of velocity and position
         explain.
 
-        The functions are v|v|, and 1, x and psi_i(x), also times v and |v|, with velocity v, position x and
-        the wavelets psi_i of the force: damping can differ between press and release. With `friction`, the
-        smoothed sign of v times 1, x and psi_i(x) is added. The share is corrected for the number of
-        functions.
+        The functions are v|v|, and v times 1, x and psi_i(x), with velocity v, position x and the wavelets
+        psi_i of the force. With `friction`, functions with the smoothed sign of v in place of v are added.
+        Otherwise functions with |v| and 1 in place of v are added, because damping can differ between press
+        and release. The share is corrected for the number of functions.
         """
         velocity, known = self.velocity()
         rows = evenly_spread(np.flatnonzero(known))
@@ -261,10 +261,12 @@ class Dynamics:
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
         over_x = np.concatenate([np.ones_like(x), x, basis.columns(x)], 1)
-        columns = [over_x, v * np.abs(v), v * over_x, np.abs(v) * over_x]
+        columns = [v * np.abs(v), v * over_x]
         if friction:
             slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(v * v)))
             columns.append(np.tanh(v / slow) * over_x)
+        else:
+            columns += [over_x, np.abs(v) * over_x]
         table = np.concatenate(columns, 1)
         product = table.T @ r
         share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))

@@ -153,8 +153,8 @@ FASTER = (
 """Finding on strokes that differ by their speed, with the way of the change and its size."""
 
 TURNED = (
-    "at the same position and stroke the force {} with the position of the last turn, by {}. Identify the "
-    "cycles of each amplitude separately, with --rows"
+    "the force depends on the position of the last turn{pinched}: at the same position and stroke it {} with "
+    "that position, by {}. Cure: identify the cycles of each amplitude separately, with --rows"
 )
 """Finding on strokes that differ by the turn before them."""
 
@@ -292,16 +292,21 @@ def _loop_reason(best: Candidate) -> str:
     criterion = [deviance("bic", max(rss, TINY), n, p) for rss, p in ((after, int(known.sum())), (before, 0))]
     if criterion[0] >= criterion[1]:
         return ""
-    pinched = ""
-    if best.strokes is not None:
-        height = best.parts_at(np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None])[1]
-        sides = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
-        if np.max(np.minimum(*sides) - height) > MOST_JND * _floor(best):
-            pinched = ", and the loops narrow inside (pinching)"
     return (
-        f"the force there depends on the position of the last turn{pinched}. Cure: identify the cycles of "
-        "each amplitude separately, with --rows"
+        f"the force there depends on the position of the last turn{_pinched(best)}. Cure: identify the "
+        "cycles of each amplitude separately, with --rows"
     )
+
+
+def _pinched(best: Candidate) -> str:
+    """Returns a clause on loops that are narrower inside than at both sides; empty for other loops."""
+    if best.strokes is None:
+        return ""
+    height = best.parts_at(np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None])[1]
+    sides = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
+    if np.max(np.minimum(*sides) - height) <= MOST_JND * _floor(best):
+        return ""
+    return ", and the loops narrow inside (pinching)"
 
 
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
@@ -397,7 +402,8 @@ def drift_findings(best: Candidate) -> list[Finding]:
     most = min(left for left, *_ in found) + least * float(weight @ residual**2)
     _, reason, change, noticed = next(each for each in found if each[0] <= most)
     difference = f"{data.force_unit.text(abs(change))}, {noticed:.2g} just noticeable differences"
-    return [usable(reason.format("rises" if change > 0.0 else "falls", difference))]
+    way = "rises" if change > 0.0 else "falls"
+    return [usable(reason.format(way, difference, pinched=_pinched(best)))]
 
 
 def _floor(best: Candidate) -> float:

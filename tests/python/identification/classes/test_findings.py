@@ -189,7 +189,8 @@ def test_strokes_that_differ_by_their_amplitude_are_not_called_a_changed_object(
     force = 5.0 * x + side * away + np.random.default_rng(8).normal(0.0, 0.01, len(x))
     verdict = str(palpate.identify(palpate.Recording.from_arrays(x, force, direction=side)).verdict)
     assert "or the object changed" not in verdict
-    assert "the force falls with the position of the last turn, by 0.2" in verdict
+    assert "the force depends on the position of the last turn" in verdict
+    assert "it falls with that position, by 0.2" in verdict
 
 
 DATA = measured_data() or Path("no measured data")
