@@ -22,6 +22,7 @@ from .contact import air_rows
 from .files import Layout, sha256_of_file
 from .looks import clock_seconds
 from .motion import waits
+from .revolutions import continued_angle
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import CLOCK, COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
@@ -332,6 +333,10 @@ def converted(
                 f"the time begins again in {table.place(begun[0])}; it continues after a pause as long as "
                 f"the longest block, and --rows 0:{begun[0]} reads the first one"
             )
+    if (unit := choice.position.unit) is not None and unit.si == "rad":
+        angle, force = choice.position.name, choice.force.name
+        cells[angle], jumps = continued_angle(angle, cells[angle], cells[force], 2.0 * math.pi / unit.factor)
+        notes += jumps
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)
     all_cells = cells

@@ -24,6 +24,7 @@ from .display import columns_of, html_of
 from .files import write_csv
 from .mcap_file import write_mcap
 from .motion import cycles_of
+from .revolutions import continued_angle
 from .roles import Informative
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
@@ -160,9 +161,12 @@ class Recording:
                 raise InputError(
                     f"{name} has shape {arrays[name].shape}, but position has {arrays['position'].shape}"
                 )
-        n = len(arrays["position"])
+        n, position = len(arrays["position"]), arrays["position"]
+        notes: list[str] = []
+        if checked_units["position"] == "rad" and len(arrays["force"]) == n:
+            position, notes = continued_angle("position", position, arrays["force"])
         return cls(
-            position=arrays["position"],
+            position=position,
             force=arrays["force"],
             time=arrays.get("time"),
             direction=signs,
@@ -172,6 +176,7 @@ class Recording:
             metadata=_mapping("metadata", metadata),
             units=checked_units,
             source=Source(files=(), sha256=digest_of(*arrays.values(), signs), rows=n, columns={}),
+            notes=tuple(notes),
         )
 
     @classmethod

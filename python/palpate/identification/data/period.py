@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
+from ...recording.conversion import MIN_ROWS
 from ...recording.motion import directions_of
 
 LEAST_CORRELATION = 0.5
@@ -21,15 +23,15 @@ REVOLUTION = 2.0 * np.pi
 SAME_STEP = 1e-3
 """Share of a step by which rounding in a file may change it [-]."""
 
-SAME_PEAK = 0.95
-"""Share of the largest correlation from which the correlation at a shorter distance is that of the period
-[-]: the force repeats after two periods as well."""
+LEAST_SHARE = 0.25
+"""Least share of the squared difference of repeats that a longer period must explain [-]: a straight
+line over the travel, taken modulo at most half of it, explains no more."""
 
 HARMONICS = 6
 """Number of harmonics of the fit that refines a period; with 4 or 12 the period has the same error."""
 
-FIT_STEPS = 8
-"""Number of steps of the fit that refines a period: enough from an error of a tenth of a period."""
+FIT_STEPS = 12
+"""Number of steps of the fit that refines a period: enough from an error of a quarter of a wave."""
 
 BIWEIGHT = 4.685
 """Residual without weight [standard deviations]: 95 % efficiency for normal noise (Holland & Welsch 1977)."""
@@ -38,66 +40,111 @@ BIWEIGHT = 4.685
 def period_of(recordings: Sequence[Recording]) -> float | None:
     """Returns the distance after which the force repeats [position]; None without at least two repeats.
 
-    The strokes of one direction are compared, because hysteresis has the same sign in them.
+    It is the shortest part of the distance with the largest autocorrelation at which the repeats differ as
+    little as at this distance. The strokes of one direction are compared, because hysteresis has the same
+    sign in them.
     """
     position, force, way = _strokes(recordings)
     press = way > 0.0
-    if not press.any():
-        return None
-    least, travel, cells = position[press].min(), float(np.ptp(position[press])), int(press.sum()) // 2
+    # Fewer rows can also be those of a force that repeats between them.
+    travel = float(np.ptp(position[press])) if np.count_nonzero(press) > 2 * MIN_ROWS else 0.0
     if not travel > 0.0:
         return None
-    box, share = (position - least) / travel, force / (float(np.abs(force).max()) or 1.0)
-    peak = _first_peak(_autocorrelation(_curve(box[press], share[press], cells)))
-    return None if peak is None else travel * _fitted(box, share, way, peak / cells)
+    box, share = (position - position[press].min()) / travel, force / (float(np.abs(force).max()) or 1.0)
+    # A wave shorter than two steps of the motion would only show which stroke a row belongs to.
+    steps = np.abs(np.diff(box))
+    cells = min(round(1.0 / float(np.median(steps[steps > 0.0]))), len(box))
+    repeat = _repeat(_curve(box[press], share[press], cells))
+    if repeat is None:
+        return None
+
+    def squared_error(period: float) -> float:
+        return _squared_error(box, share, way, period, cells)
+
+    (wave, count), orders = repeat, np.arange(1, HARMONICS + 1)
+    wave = _fitted(box, share, way, wave, orders, cells)
+    allowed = squared_error(count * wave) / (1.0 - LEAST_SHARE)
+    divisors = (each for each in range(1, count + 1) if count % each == 0)
+    waves = next(each for each in divisors if squared_error(each * wave) <= allowed)
+    period = waves * wave
+    if waves > 1:
+        period = _fitted(box, share, way, period, np.append(waves * orders, orders), cells)
+    if (revolution := revolution_of(recordings)) is not None:
+        # The force repeats after a revolution, of which its period is exactly a part.
+        part = revolution / travel / max(round(revolution / travel / period), 1)
+        if (1.0 - LEAST_SHARE) * squared_error(part) <= squared_error(period):
+            period = part
+    return travel * period
 
 
 def revolution_of(recordings: Sequence[Recording]) -> float | None:
-    """Returns 2 pi if the angle of the press strokes closes a revolution, else None.
+    """Returns 2 pi if the angle of the strokes closes a revolution, else None.
 
-    Then neither the gap between two angles nor the step of the force is larger where the revolution closes
-    than somewhere along the strokes. The force of a torsion spring jumps there.
+    Then the gap between two angles is not larger where the revolution closes than somewhere along the
+    strokes, and the force changes as little from angle to angle. The force of a torsion spring jumps there.
     """
     position, force, way = _strokes(recordings)
-    position, force = position[way > 0.0], force[way > 0.0]
     if not len(position) or any(each.units["position"] != "rad" for each in recordings):
         return None
+    for stroke in (way > 0.0, way < 0.0):
+        force[stroke] -= force[stroke].mean() if stroke.any() else 0.0
 
-    def largest_steps(angle: Float1D, *end: float) -> tuple[float, float]:
+    def steps(angle: Float1D, *end: float) -> tuple[float, float]:
         order = np.argsort(angle, kind="stable")
         gap = np.diff(angle[order], append=[angle[order[0]] + each for each in end])
         step = np.diff(force[order], append=[force[order[0]] for _ in end])
-        return float(gap.max(initial=0.0)), float(np.abs(step).max(initial=0.0))
+        return float(gap.max(initial=0.0)), float(step @ step)
 
-    along, around = largest_steps(position), largest_steps(np.mod(position, REVOLUTION), REVOLUTION)
-    closed = around[0] <= (1.0 + SAME_STEP) * along[0] and around[1] <= (1.0 + SAME_STEP) * along[1]
+    along, around = steps(position), steps(np.mod(position, REVOLUTION), REVOLUTION)
+    closed = around[0] <= (1.0 + SAME_STEP) * along[0] and (1.0 - LEAST_SHARE) * around[1] <= along[1]
     return REVOLUTION if closed else None
 
 
 def _strokes(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D, Float1D]:
     """Returns positions, forces and directions of the rows of recordings in which the tool moves; empty if
     the direction is not known or the force has further inputs."""
-    ways = [directions_of(each) for each in recordings]
-    if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    way = np.concatenate([way for way in ways if way is not None])
-    position, force = (
-        np.concatenate([getattr(each, name) for each in recordings])[way != 0.0]
-        for name in ("position", "force")
-    )
-    return position, force, way[way != 0.0]
+    strokes = [np.zeros((3, 0))]
+    for each in recordings:
+        way, waiting = directions_of(each), each.motion.waiting
+        if way is None or len(each.input_names):
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        moving = (way != 0) & (True if waiting is None else ~waiting)
+        strokes.append(np.array([each.position, each.force, way])[:, moving])
+    position, force, side = np.concatenate(strokes, axis=1)
+    return position, force, side
 
 
-def _fitted(box: Float1D, force: Float1D, way: Float1D, period: float) -> float:
+def _squared_error(box: Float1D, force: Float1D, way: Float1D, period: float, cells: int) -> float:
+    """Returns the mean squared difference between the force (n,) and its mean over all repeats at the same
+    place and in the same direction."""
+    places, squares, freedom = max(round(cells * period), 1), 0.0, 0
+    for stroke in (way > 0.0, way < 0.0):
+        if stroke.any():
+            at = np.mod(box[stroke] / period, 1.0)
+            curve = _curve(at, force[stroke], places)
+            mean = np.interp(places * at, np.arange(places) + 0.5, curve, period=places)
+            squares += float(np.sum((force[stroke] - mean) ** 2))
+            freedom += len(at) - len(np.unique((places * at).astype(np.intp)))
+    return squares / max(freedom, 1)
+
+
+def _fitted(
+    box: Float1D, force: Float1D, way: Float1D, period: float, orders: NDArray[np.intp], cells: int
+) -> float:
     """Returns the period [travel] with which harmonics fit the force best, a sum for each direction.
 
     Gauss-Newton steps of the period, with the amplitudes eliminated (Golub & Pereyra 1973, in Kaufman's
-    form). Tukey's biweight leaves out the rows behind turns, in which friction reverses, and wrong readings.
+    form). Each step adds an order, because a higher one needs a more precise period. Tukey's biweight leaves
+    out the rows behind turns, in which friction reverses, and wrong readings.
     """
+    resolved = [
+        each for each in dict.fromkeys(orders.tolist()) if each <= max(0.5 * cells * period, orders[0])
+    ]
     box, tiny = box - box.mean(), float(np.finfo(float).tiny)
-    order, weight = np.arange(1, HARMONICS + 1), np.ones(len(force))
+    weight = np.ones(len(force))
     residual, slope = np.zeros(len(force)), np.zeros(len(force))
-    for _ in range(FIT_STEPS):
+    for step in range(FIT_STEPS):
+        order = np.array(resolved[: step + 1])
         waves = np.exp(2j * np.pi * box / period)[:, None] ** order
         for stroke in (way > 0.0, way < 0.0):
             cosine, sine, w = waves[stroke].real, waves[stroke].imag, weight[stroke, None]
@@ -107,9 +154,10 @@ def _fitted(box: Float1D, force: Float1D, way: Float1D, period: float) -> float:
             turned = 2.0 * np.pi * box[stroke] / period**2 * (sine @ of_cosine - cosine @ of_sine)
             explained = columns @ np.linalg.lstsq(w * columns, weight[stroke] * turned, rcond=None)[0]
             residual[stroke], slope[stroke] = force[stroke] - columns @ found, turned - explained
-        step = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), tiny)
-        # A tenth of a period over the travel, so that the fit stays at its minimum.
-        period += float(np.clip(step, -0.1 * period**2, 0.1 * period**2))
+        change = float(weight**2 * slope @ residual) / max(float(weight**2 * slope @ slope), tiny)
+        # A tenth of a wave over the travel, so that the fit stays at its minimum.
+        bound = 0.1 * period**2 / order[0]
+        period += float(np.clip(change, -bound, bound))
         scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), tiny)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
     return period
@@ -127,32 +175,23 @@ def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:
     return np.asarray(np.interp(np.arange(cells) + 0.5, at, mean))
 
 
-def _autocorrelation(curve: Float1D) -> Float1D:
-    """Returns the correlation of a curve (n,) with itself at distances of 0 to n/2 - 1 cells, from the cells
-    that both have."""
+def _repeat(curve: Float1D) -> tuple[float, int] | None:
+    """Returns the length of the strongest wave of a curve (n,) [n], and the number of these waves after which
+    the curve is most similar to itself; None without a repeat."""
     n = len(curve)
     centred = curve - curve.mean()
-    spectrum = np.fft.rfft(centred, 2 * n)
-    products = np.fft.irfft(spectrum * spectrum.conj())[: n // 2]
+    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
-    lag = np.arange(n // 2)
+    lag = np.arange(n // 2 + 2)
     both = np.sqrt(squares[n - lag] * (squares[n] - squares[lag]))
-    return np.asarray(np.divide(products, both, out=np.zeros(n // 2), where=both > 0.0))
-
-
-def _first_peak(correlation: Float1D) -> float | None:
-    """Returns the distance of the first repeat, refined by the last one [cells]; None without a repeat."""
+    products = np.fft.irfft(power)[: len(lag)]
+    correlation = np.divide(products, both, out=np.zeros(len(lag)), where=both > 0.0)
     inner, apart = correlation[1:-1], np.flatnonzero(correlation < 0.0)
     peaks = 1 + np.flatnonzero((inner >= correlation[:-2]) & (inner > correlation[2:]))
     # A smooth force is similar to itself at short distances; a repeat follows a distance at which it is not.
-    peaks = peaks[peaks >= (apart[0] if len(apart) else len(correlation))]
+    peaks = peaks[peaks >= (apart[0] if len(apart) else n)]
     if not len(peaks) or correlation[peaks].max() < LEAST_CORRELATION:
         return None
-    first = float(peaks[correlation[peaks] >= SAME_PEAK * correlation[peaks].max()][0])
-    for repeat in range(1, int((len(correlation) - 1) / first) + 1):
-        around = np.arange(int(repeat * first - 0.25 * first), int(repeat * first + 0.25 * first) + 1)
-        around = around[(around > 0) & (around < len(correlation) - 1)]
-        if not len(around):
-            break
-        first = int(around[np.argmax(correlation[around])]) / repeat
-    return first
+    # The spectrum has a value for every half wave over the curve, which must hold at least two waves.
+    waves = 2.0 + 0.5 * int(np.argmax(power[4:]))
+    return 1.0 / waves, max(round(peaks[np.argmax(correlation[peaks])] / n * waves), 1)

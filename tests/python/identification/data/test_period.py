@@ -12,6 +12,7 @@ from imperfect import Array, knob, press_and_release
 from palpate import Recording
 from palpate.identification.data.period import period_of, revolution_of
 
+TURN = 2.0 * np.pi
 TURNS = press_and_release(3600, 1080.0)
 
 
@@ -52,7 +53,7 @@ def test_rows_that_are_held_out_do_not_change_the_period() -> None:
 @pytest.mark.parametrize("wrong", [0, 12])
 @pytest.mark.parametrize("travel", [35.0, 55.0])
 def test_friction_that_reverses_and_wrong_readings_do_not_shift_the_period(travel: float, wrong: int) -> None:
-    angle, random = press_and_release(400, travel), np.random.default_rng(2)
+    angle, random = press_and_release(400, travel), np.random.default_rng(3)
     side = np.concatenate([np.minimum(angle[:400] - 1.0, 1.0), np.maximum(angle[400:] - travel + 1.0, -1.0)])
     torque = knob(angle) + 2.5 * side + random.normal(0.0, 0.02, 800)
     torque[random.choice(800, wrong, replace=False)] += 40.0
@@ -94,6 +95,34 @@ def test_few_rows_in_each_detent_give_the_period_of_one_detent(rows: int, detent
     assert period_of([turned(x, 10.0 * torque)]) == pytest.approx(15.0, rel=0.01)
 
 
+@pytest.mark.parametrize("step", [2.5, 2.86, 3.09, 3.19, 3.27, 3.57])
+def test_many_detents_of_six_rows_give_the_period_of_one_detent(step: float) -> None:
+    x = press_and_release(int(324.0 / step) + 1, 324.0)
+    torque = np.sin(TURN * x / 20.0) + 0.2 * np.sin(2.0 * TURN * x / 20.0)
+    assert period_of([turned(x, 100.0 * torque)]) == pytest.approx(20.0, rel=1e-4)
+
+
+def test_the_model_of_many_detents_of_six_rows_is_good() -> None:
+    x = press_and_release(102, 324.0)
+    torque = np.sin(TURN * x / 20.0) + 0.2 * np.sin(2.0 * TURN * x / 20.0)
+    model = palpate.identify(turned(x, 100.0 * torque), max_wavelets=8)
+    assert model.period == pytest.approx(20.0, rel=1e-4)
+    assert (model.verdict.level, sorted(set(model.orders))) == ("good", [1.0, 2.0])
+
+
+def test_narrow_detents_give_the_period_of_one_detent() -> None:
+    x = press_and_release(136, 51.0)
+    phase = np.mod(x / 15.0 + 0.3, 1.0) - 0.5
+    assert period_of([turned(x, -400.0 * phase * np.exp(-200.0 * phase**2))]) == pytest.approx(15.0, rel=3e-3)
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_an_offset_between_strokes_does_not_give_a_multiple_of_the_period(cycles: int) -> None:
+    x = np.concatenate([press_and_release(270, 73.0)] * cycles)
+    force = 8.0 * np.sin(TURN * x / 15.0) + 0.4 * np.linspace(0.0, 1.0, len(x))
+    assert period_of([turned(x, force)]) == pytest.approx(15.0, rel=1e-3)
+
+
 def test_shuffled_rows_and_further_inputs_have_no_period() -> None:
     order = np.random.default_rng(0).permutation(len(TURNS))
     shuffled = Recording.from_arrays(TURNS[order], knob(TURNS)[order])
@@ -129,9 +158,6 @@ def test_a_given_period_is_not_searched() -> None:
     assert "The force repeats every" not in str(model.notes["identification"])
 
 
-TURN = 2.0 * np.pi
-
-
 def motor(angle: Array) -> Array:
     return np.asarray(np.sin(3.0 * angle) + 0.5 * np.cos(7.0 * angle + 1.0) + 0.2 * np.sin(angle))
 
@@ -165,6 +191,40 @@ def test_an_open_revolution_a_length_or_a_spring_has_no_period_of_a_turn(
     recording = at_angles(law, turns, unit)
     assert revolution_of([recording]) is None
     assert palpate.identify(recording, max_wavelets=6).period is None
+
+
+def with_friction(law: Callable[[Array], Array], turns: float, seed: int, unit: str = "rad") -> Recording:
+    """Returns a recording of a motor whose friction reverses over 0.01 rad."""
+    press, random = np.linspace(0.0, TURN * turns, int(900 * turns)), np.random.default_rng(seed)
+    angle = np.concatenate([press, press[::-1]])
+    friction = np.concatenate([np.minimum(press / 0.005 - 1.0, 1.0), 1.0 - np.minimum(press / 0.005, 2.0)])
+    torque = law(angle) + 30.0 * friction + random.normal(0.0, 2.0, len(angle))
+    return Recording.from_arrays(angle, torque, units={"position": unit, "force": "N*m"})
+
+
+def cogging(angle: Array) -> Array:
+    return np.asarray(20.0 * np.sin(84.0 * angle) + 8.0 * np.sin(12.0 * angle + 1.0) + 7.0 * np.sin(angle))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_period_holds_every_wave_of_the_force(seed: int) -> None:
+    assert period_of([with_friction(cogging, 2.05, seed, "m")]) == pytest.approx(TURN, rel=3e-5)
+
+
+def test_the_period_is_exactly_a_part_of_a_closed_revolution() -> None:
+    recording = with_friction(lambda angle: 40.0 * np.sin(24.0 * angle), 2.05, 0)
+    assert period_of([recording]) == TURN / 24
+
+
+def test_a_revolution_with_friction_that_reverses_is_the_period() -> None:
+    assert revolution_of([with_friction(cogging, 1.2, 0)]) == TURN
+    recording = with_friction(lambda angle: 20.0 * np.sin(12.0 * angle) + 9.0 * np.sin(angle), 1.2, 0)
+    assert palpate.identify(recording, max_wavelets=3).period == TURN
+
+
+@pytest.mark.parametrize("turns", [1.0, 1.2])
+def test_a_spring_with_friction_that_reverses_does_not_close_a_revolution(turns: float) -> None:
+    assert revolution_of([with_friction(lambda angle: 40.0 * angle, turns, 0)]) is None
 
 
 @pytest.mark.parametrize("seed", sampled([30, 33, 40], 40))
