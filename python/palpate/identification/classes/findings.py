@@ -158,18 +158,18 @@ TURNED = (
 )
 """Finding on strokes that differ by the turn before them."""
 
+LATER = (
+    "from the first row to the last the force at the same position and stroke {} by {}: the zero of the "
+    "force or the object changed. Let both warm up, press the object several times first, do not set the "
+    "force to zero during the recording, or identify the parts of the recording separately with --rows"
+)
+"""Finding on strokes that differ by their time."""
+
 FIRST = (
     "behind the first stroke over a position the force there {} by {}: the object or the zero of the force "
     "changed. Press the object several times before the recording, or leave out the first strokes with --rows"
 )
 """Finding on a first stroke that differs from the later ones."""
-
-LATER = (
-    "from the first row to the last the force at the same position and stroke {} by {}: the zero of the "
-    "force or the object changed. Let both warm up, do not set the force to zero during the recording, or "
-    "identify the parts of the recording separately with --rows"
-)
-"""Finding on strokes that differ by their time."""
 
 
 def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
@@ -216,8 +216,10 @@ class _Strokes:
         end = self.rows[starts + rows - 1][self.number]
         if data.parts:
             time = np.concatenate([piece.row_time for piece in data.parts])
-            distance = np.abs(data.path[end, 0] - data.path[begin, 0])
-            speed = distance / np.maximum(time[end] - time[begin], TINY)
+            lasting, speed = time[end] - time[begin], np.zeros(len(end))
+            np.divide(
+                np.abs(data.path[end, 0] - data.path[begin, 0]), lasting, out=speed, where=lasting > 0.0
+            )
             if spread_of_speeds(speed) >= LEAST_SPEED_SPREAD:
                 yield FASTER, speed, float(np.ptp(speed))
         turn = data.path[begin, 0]
@@ -225,8 +227,8 @@ class _Strokes:
             yield TURNED, turn, moved
         earliest = np.full(2 * PLACES, len(index))
         np.minimum.at(earliest, self.group, self.number)
-        yield FIRST, (self.number > earliest[self.group]).astype(float), 1.0
         yield LATER, 0.5 * (begin + end) / len(data.force), 1.0
+        yield FIRST, (self.number > earliest[self.group]).astype(float), 1.0
 
     def centred(self, values: Float1D) -> Float1D:
         """Returns values (k,) minus their weighted mean at each place and direction."""

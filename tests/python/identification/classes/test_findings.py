@@ -163,10 +163,12 @@ def conditioned(count: int, loss: float) -> palpate.Recording:
     return palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x)))
 
 
-@pytest.mark.parametrize(("count", "loss"), sampled([(2, 0.3), (5, 0.3), (2, 0.01)], (2, 0.3), (5, 0.3)))
-def test_a_first_press_that_differs_from_the_others_is_named(count: int, loss: float) -> None:
-    verdict = str(palpate.identify(conditioned(count, loss)).verdict)
-    assert ("behind the first stroke over a position the force there falls by" in verdict) == (loss > 0.01)
+@pytest.mark.parametrize("count", [2, 5])
+def test_a_first_press_that_differs_from_the_others_is_named(count: int) -> None:
+    """Of two presses, the first one may also be an object that changes with time."""
+    named = ("from the first row to the last", "behind the first stroke over a position")[count > 2]
+    assert named in str(palpate.identify(conditioned(count, 0.3)).verdict)
+    assert palpate.identify(conditioned(count, 0.005)).verdict.level == "good"
 
 
 def test_strokes_that_differ_by_their_speed_are_not_only_called_a_changed_object() -> None:
