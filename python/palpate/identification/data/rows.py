@@ -16,7 +16,7 @@ from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
-from ...recording.motion import Piece, ordered_strokes, pieces, velocity
+from ...recording.motion import Piece, ordered_strokes, pieces, resolution_of, velocity
 from ...recording.roles import Role, roles_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
@@ -419,7 +419,7 @@ of its force]."""
 
 def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str, list[Finding]]:
     """Returns the note and the findings on the part of the repeat length of a periodic force that positions
-    (n,) cover."""
+    (n,) in recorded order cover, each a step of the sensor."""
     lower, travel = float(position.min()), float(np.ptp(position))
     note = (
         f"The positions span {travel / period:.4g} periods of {_exact(period, unit)} and are taken modulo "
@@ -435,13 +435,14 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
     steps = np.diff(np.append(box, box[0] + 1.0))
     widest = int(np.argmax(steps))
     share = float(steps[widest])
-    if share <= USABLE_GAP:
+    seen = min(resolution_of((position - lower) / travel) * travel, period) / period if travel > 0.0 else 0.0
+    if share - seen <= USABLE_GAP:
         return note, []
     start = lower + period * float(box[widest])
-    judge = no if share > UNFIT_GAP else usable
+    judge = no if share - seen > UNFIT_GAP else usable
     sentence = (
         f"no position lies between {start:.6g} and {_exact(start + share * period, unit)}, {100 * share:.3g} "
-        f"% of the period of {_exact(period, unit)}; record a whole period, or check the unit of --period"
+        f"% of the period of {_exact(period, unit)}; record a whole period, or give its length with --period"
     )
     return note, [judge(sentence)]
 

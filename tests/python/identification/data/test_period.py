@@ -11,6 +11,7 @@ from conftest import sampled
 from imperfect import Array, knob, press_and_release
 from palpate import Recording
 from palpate.identification.data.period import period_of, revolution_of
+from palpate.identification.data.rows import period_notes
 
 TURN = 2.0 * np.pi
 TURNS = press_and_release(3600, 1080.0)
@@ -243,3 +244,12 @@ def test_a_period_is_found_below_noise_of_which_each_model_counts_other_independ
     model = palpate.identify(recording)
     assert model.fit.nrmse > 0.1
     assert model.period == pytest.approx(1.0, rel=0.01)
+
+
+def test_counts_of_an_encoder_leave_no_gap_in_a_period() -> None:
+    counts = np.concatenate([np.arange(0.0, 769.0), np.arange(768.0, -1.0, -1.0)])
+    note, findings = period_notes(counts, 16.0, "count")
+    assert "48 periods" in note
+    assert findings == []
+    _, (finding,) = period_notes(counts[counts % 16.0 < 13.0], 16.0, "count")
+    assert "no position lies between 12 and 16" in finding.sentence
