@@ -176,7 +176,9 @@ class Recorded:
     def of(cls, recordings: Sequence[Recording], found: FittedNetwork, options: IdentifyOptions) -> Recorded:
         force = np.concatenate([part.force for part in recordings])
         near_zero = options.search.contact_share * float(np.ptp(force))
-        if found.below != "free" or (options.below == "auto" and force.min() < -near_zero):
+        # A network of several inputs does not state what is below its domain.
+        below = found.below if len(found.lower) == 1 else options.below
+        if below == "linear" or (options.below == "auto" and force.min() < -near_zero):
             near_zero = -1.0  # some rows are pulled
         position = np.concatenate([part.position for part in recordings])
         lower = float(position.min()) if near_zero < 0.0 else contact_at(position, force)
