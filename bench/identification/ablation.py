@@ -143,6 +143,10 @@ def _second(_: Any, value: Any, *__: Any) -> Any:
     return value
 
 
+def _zeros(residual: Any, position: Any, rows: Any) -> Any:
+    return np.zeros(np.count_nonzero(rows))
+
+
 def _nothing(*_: Any, **__: Any) -> Any:
     return None
 
@@ -244,6 +248,7 @@ RULES = (
     ),
     Rule("rows of a slower sensor", f"{CHECKS}.wrong_readings", "_rows_held", _one),
     Rule("residuals show wrong readings", "identification.identify", "Informative", OfForces),
+    Rule("other strokes show errors of the model", f"{CHECKS}.wrong_readings", "_of_other_strokes", _zeros),
     Rule("waits are judged by time", "recording.conversion", "waits", lambda x, time=None: waits(x)),
     Rule("play follows over a gap", f"{DATA}.rows", "ordered_strokes", _nothing),
     Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
@@ -381,6 +386,29 @@ def of_kinks(draw: int) -> Fit:
     return Fit([recording], lambda model: given.nrmse(model.force(given.X_test[:, 0])), {})
 
 
+def of_preload(draw: int) -> Fit:
+    """Returns a gas spring with friction that a load cell with 10 readings a second meets six times."""
+    random = np.random.default_rng(draw)
+    preload, friction = random.uniform(150.0, 400.0), random.uniform(8.0, 20.0)
+    half = 104.5 / 12.0
+    time = np.arange(0.0, 6.0 * half, 0.1) + random.uniform(0.0, 0.1)
+    x = -9.5 + 12.0 * (half - np.abs(time % (2.0 * half) - half))
+
+    def law(x: Array, way: Array | float) -> Array:
+        return np.clip(x / 0.5, 0.0, 1.0) * (preload / (1.0 - 0.0025 * np.maximum(x, 0.0)) + friction * way)
+
+    force = law(x, np.where(time % (2.0 * half) < half, 1.0, -1.0)) + random.normal(0.0, 0.5, len(x))
+    recording = Recording.from_arrays(np.round(x, 2), 10.0 * np.round(10.2 * force))
+    at = np.linspace(-9.0, 94.0, 4000)
+    truth = 102.0 * np.concatenate([law(at, 1.0), law(at, -1.0)])
+
+    def error(model: Model) -> float:
+        found = np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
+        return float(normalised(root_mean_square(found - truth), truth))
+
+    return Fit([recording], error, {})
+
+
 def of_slots(draw: int) -> Fit:
     """Returns the torque of a motor with seven poles and twelve slots, identified with the period of one
     pole."""
@@ -473,6 +501,7 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
         found += [(f"{form.__name__}, draw {draw}", of_stored, form, draw) for form in STORED]
         found.append((f"poles and slots, draw {draw}", of_slots, draw))
         found.append((f"kinks without noise, draw {draw}", of_kinks, draw))
+        found.append((f"preload, draw {draw}", of_preload, draw))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found
