@@ -455,7 +455,7 @@ def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
     continuation does not."""
     data = best.data
     box = data.box[data.fitted & (into * best.static_force > near_zero), 0]
-    reached = float((box if into > 0.0 else 1.0 - box).min(initial=1.0)) if len(box) else 0.0
+    reached = float((box if into > 0.0 else 1.0 - box).min()) if len(box) else 0.0
     way = np.linspace(0.0, reached, COMPARED_POSITIONS)
     middle, half = best.parts_at((way if into > 0.0 else 1.0 - way)[:, None])
     least = into * middle - np.abs(half)
