@@ -291,7 +291,7 @@ RULES = (
     constant("recording.roles.roles_of", "AIR_MARGIN", 1.0),
     constant("recording.roles.contact_at", "FORCE_FLOOR", 1.0, "recording.contact"),
     constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
-    constant("identification.identify.period_of", "LEAST_SHARE", 1.0, f"{DATA}.period"),
+    constant("identification.identify.period_of", "LEAST_SHARE", 0.999, f"{DATA}.period"),
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
     constant(f"{CLASSES}.findings.left_out_residual", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),
     constant(f"{CLASSES}.model_selection.correlated_noise", "LEAST_INDEPENDENT_SHARE", 0.0),
@@ -409,10 +409,10 @@ def of_preload(draw: int) -> Fit:
     return Fit([recording], error, {})
 
 
-def of_slots(draw: int) -> Fit:
-    """Returns the torque of a motor with seven poles and twelve slots, identified with the period of one
-    pole."""
-    random, angle = np.random.default_rng([40, draw]), 2.0 * np.pi * np.arange(512) / 512
+def of_slots(draw: int, turns: int = 1) -> Fit:
+    """Returns the torque of a motor with seven poles and twelve slots over some turns, identified with the
+    period of one pole for one turn, else with the period that is found."""
+    random, angle = np.random.default_rng([40, draw]), 2.0 * np.pi * turns * np.arange(512) / 512
 
     def torque(angle: Array) -> Array:
         return np.sin(7.0 * angle) + 0.3 * np.cos(12.0 * angle)
@@ -424,7 +424,7 @@ def of_slots(draw: int) -> Fit:
         truth = torque(between)
         return float(normalised(root_mean_square(model.force(between) - truth), truth))
 
-    return Fit([recording], error, {"period": 2.0 * np.pi / 7.0})
+    return Fit([recording], error, {"period": 2.0 * np.pi / 7.0} if turns == 1 else {})
 
 
 def of_gap(draw: int) -> Fit:
@@ -502,6 +502,7 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
         found.append((f"poles and slots, draw {draw}", of_slots, draw))
         found.append((f"kinks without noise, draw {draw}", of_kinks, draw))
         found.append((f"preload, draw {draw}", of_preload, draw))
+        found.append((f"poles and slots over three turns, draw {draw}", of_slots, draw, 3))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found

@@ -9,10 +9,6 @@ import numpy as np
 
 from .._typing import Float1D
 
-MAX_STEP = 0.25
-"""Largest step of an angle whose direction is certain [revolutions]: at twice this step both directions are
-equally near."""
-
 MAX_STEP_RATIO = 2.0
 """Largest ratio of a step to the largest other step that can be chance [-]."""
 
@@ -32,7 +28,8 @@ def continued_angle(
     revolutions = np.rint(step / revolution)
     jumps = revolutions != 0.0
     left = np.abs(step - revolution * revolutions)
-    if not jumps.any() or not left.max() <= MAX_STEP * revolution:
+    # Both directions are equally near at half of a revolution: a step must be shorter by more than chance.
+    if not jumps.any() or not MAX_STEP_RATIO * left.max() <= 0.5 * revolution:
         return angle, []
     for change in (left, np.abs(np.diff(force[known]))):
         if change[jumps].max() > MAX_STEP_RATIO * change[~jumps].max(initial=0.0):

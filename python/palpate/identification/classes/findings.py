@@ -142,9 +142,6 @@ MOST_JND = 2.0
 """Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
 
 
-PARTS = 10
-"""Number of parts of the travel; in each of them strokes can differ by another force."""
-
 FASTER = (
     "at the same position and stroke the force {} with the speed of the stroke, from the slowest to the "
     "fastest by {}: it depends on the velocity, or the object changed at the same time. Alternate slow "
@@ -152,9 +149,12 @@ FASTER = (
 )
 """Finding on strokes that differ by their speed, with the way of the change and its size."""
 
+APART = "Cure: identify the cycles of each amplitude separately, with --rows"
+"""Cure for a force that depends on the last turn"""
+
 TURNED = (
     "the force depends on the position of the last turn{pinched}: at the same position and stroke it {} with "
-    "that position, by {}. Cure: identify the cycles of each amplitude separately, with --rows"
+    f"that position, by {{}}. {APART}"
 )
 """Finding on strokes that differ by the turn before them."""
 
@@ -294,10 +294,7 @@ def _loop_reason(best: Candidate) -> str:
     criterion = [deviance("bic", max(rss, TINY), n, p) for rss, p in ((after, int(known.sum())), (before, 0))]
     if criterion[0] >= criterion[1]:
         return ""
-    return (
-        f"the force there depends on the position of the last turn{_pinched(best)}. Cure: identify the "
-        "cycles of each amplitude separately, with --rows"
-    )
+    return f"the force there depends on the position of the last turn{_pinched(best)}. {APART}"
 
 
 def _pinched(best: Candidate) -> str:
@@ -376,23 +373,23 @@ def drift_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
     noticeable difference. One press and release cannot show this.
 
-    The residuals are fitted over each property of the strokes, with a slope for each part of the travel: a
-    difference that varies over the travel is not noise. The property that explains most is named.
+    The residuals are fitted over each property of the strokes, with a slope for each direction, and the
+    property that explains most is named.
     """
     data = best.data
     if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
         return []
     rows, weight, residual = strokes.rows, strokes.weight, strokes.centred(best.residual[strokes.rows])
-    part, least = strokes.group * PARTS // PLACES, np.finfo(float).eps * len(rows)
-    free = len(rows) - len(np.unique(strokes.group)) - len(np.unique(part))
+    way, least = strokes.group // PLACES, np.finfo(float).eps * len(rows)
+    free = len(rows) - len(np.unique(strokes.group)) - len(np.unique(way))
     found = []
     for reason, values, span in strokes.properties(data) if free > 0 else ():
         moment = strokes.centred(values)
-        cross, square = (np.bincount(part, weight * moment * each) for each in (residual, moment))
+        cross, square = (np.bincount(way, weight * moment * each) for each in (residual, moment))
         if not square.sum() > least:
             continue
         slope = np.divide(cross, square, out=np.zeros_like(cross), where=square > least)
-        noise = residual - slope[part] * moment
+        noise = residual - slope[way] * moment
         left, change = float(weight @ noise**2), float(cross.sum() / square.sum()) * span
         independent = max(1.0, free * (1.0 - max(neighbour_correlation(noise), 0.0)))
         excess = abs(change) - PLACE_ERRORS * span * float(np.sqrt(left / square.sum() / independent))
@@ -404,8 +401,8 @@ def drift_findings(best: Candidate) -> list[Finding]:
     most = min(left for left, *_ in found) + least * float(weight @ residual**2)
     _, reason, change, noticed = next(each for each in found if each[0] <= most)
     difference = f"{data.force_unit.text(abs(change))}, {noticed:.2g} just noticeable differences"
-    way = "rises" if change > 0.0 else "falls"
-    return [usable(reason.format(way, difference, pinched=_pinched(best)))]
+    rises = "rises" if change > 0.0 else "falls"
+    return [usable(reason.format(rises, difference, pinched=_pinched(best)))]
 
 
 def _floor(best: Candidate) -> float:

@@ -30,9 +30,6 @@ line over the travel, taken modulo at most half of it, explains no more."""
 HARMONICS = 6
 """Number of harmonics of the fit that refines a period; with 4 or 12 the period has the same error."""
 
-FIT_STEPS = 12
-"""Number of steps of the fit that refines a period: enough from an error of a quarter of a wave."""
-
 BIWEIGHT = 4.685
 """Residual without weight [standard deviations]: 95 % efficiency for normal noise (Holland & Welsch 1977)."""
 
@@ -143,7 +140,7 @@ def _fitted(
     box, tiny = box - box.mean(), float(np.finfo(float).tiny)
     weight = np.ones(len(force))
     residual, slope = np.zeros(len(force)), np.zeros(len(force))
-    for step in range(FIT_STEPS):
+    for step in range(2 * HARMONICS):  # all orders of a wave and of its repeat
         order = np.array(resolved[: step + 1])
         waves = np.exp(2j * np.pi * box / period)[:, None] ** order
         for stroke in (way > 0.0, way < 0.0):
