@@ -279,7 +279,7 @@ def weights_behind_turns(
     (moving, stroke, begins), weight = turns_before(order), np.ones(len(path))
     if not len(moving):
         return weight
-    x, way, error = path[moving], order[moving] > 0.0, residual[moving]
+    x, way, square = path[moving], order[moving] > 0.0, residual[moving] ** 2 + least**2
     ends = np.append(begins[1:], moving[-1])
     leaves = not touched[ends].all()
 
@@ -294,18 +294,17 @@ def weights_behind_turns(
     if not (far := behind % (FAR + 1) == FAR).any():
         return weight
 
-    def mean(part: NDArray[np.intp], values: Float1D) -> Float1D:
+    def mean(part: NDArray[np.intp]) -> Float1D:
         count = np.bincount(part, minlength=2 * FAR + 2)
-        return np.bincount(part, values, 2 * FAR + 2) / np.where(count, count, np.nan)
+        return np.bincount(part, square, 2 * FAR + 2) / np.where(count, count, np.nan)
 
-    square = error**2 + least**2
     of_all = float(np.mean(square[far]))
     # The direction of a row next to a turn is uncertain, and that of the row at which the tool turns unknown.
     turning = np.where(np.isin(moving, ends), np.where(way, 0, FAR + 1), FAR)
-    expected = np.fmax(mean(before, square), of_all)
+    expected = np.fmax(mean(before), of_all)
     expected[:: FAR + 1] = of_all
     for part in (behind, turning):
-        shared = np.where(part % (FAR + 1) < FAR, np.fmax(mean(part, square) - expected, 0.0)[part], 0.0)
+        shared = np.where(part % (FAR + 1) < FAR, np.fmax(mean(part) - expected, 0.0)[part], 0.0)
         here = expected[part] / (expected[part] + shared * np.bincount(part)[part])
         weight[moving] = np.minimum(weight[moving], here)
     return weight
