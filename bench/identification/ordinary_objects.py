@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Provides fifteen objects that are often measured, each with its exact force law and random parameters."""
+"""Provides twenty objects that are often measured, each with its exact force law and random parameters."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 
 TURNING_SHARE = 0.002
 """Play radius in which the friction of an object reverses [share of the travel]"""
+
+SOFTENING_WITHIN = 0.1
+"""Distance from the deepest position over which a softened object becomes as stiff as new [share of the
+travel]"""
 
 
 def bend(u: Array, at: float, width: float) -> Array:
@@ -59,6 +63,12 @@ class Object:
     """Play radius [share of the travel]"""
     jerk: float = 0.0
     """Amplitude of a force that differs between strokes of the same object, such as stick-slip [scale]"""
+    inertia: float = 0.0
+    """Force at an acceleration of one travel per squared second [scale]; `force` is that without it"""
+    softening: float = 0.0
+    """Share of the force that the first press over a position removes from the later ones (Mullins)"""
+    strongest: int = 1
+    """Number of waves in a period of the strongest wave of a periodic force"""
 
     @property
     def units(self) -> dict[str, str]:
@@ -72,12 +82,18 @@ class Object:
             "velocity": self.damping > 0.0,
             "memory": self.branch is not None,
             "period": self.period is not None,
+            "mass": self.inertia > 0.0,
         }
 
     def state(self, x: Array) -> Array:
         """Returns the direction state (n,) along the positions (n,) of a motion."""
         radius = self.turning * self.travel
         return np.asarray((x - play(x, radius)) / radius)
+
+    def share_left(self, x: Array) -> Array:
+        """Returns the share (n,) of the force that is left along the positions (n,) of a motion."""
+        above = (np.maximum.accumulate(x) - x) / (SOFTENING_WITHIN * self.travel)
+        return np.asarray(1.0 - self.softening * (1.0 - np.exp(-above)))
 
     def force(self, time: Array, x: Array, s: Array, velocity: Array) -> Array:
         """Returns the force (n,) along a motion that starts from rest.
@@ -98,11 +114,32 @@ class Object:
         force = self.shape(pressed, s)
         if self.branch is not None:
             share, tau = self.branch
-            force = force + share * stretches(time, force[:, None], np.array([tau]))[:, 0, 0]
+            if self.leaves:
+                force = left_pad(time, force, share, tau)
+            else:
+                force = force + share * stretches(time, force[:, None], np.array([tau]))[:, 0, 0]
         force = force + self.damping * velocity / self.travel
         if self.leaves:
             force = np.where(u > 0.0, np.maximum(force, 0.0), 0.0)
         return np.asarray(self.scale * force)
+
+
+def left_pad(time: Array, force: Array, share: float, tau: float) -> Array:
+    """Returns the force (n,) of a relaxing object that the tool can leave, from the force at rest (n,) at the
+    position of the tool. Without contact the free surface follows slowly, and the tool meets it there again.
+    """
+    contact, surface, stretch = np.zeros(len(force)), float(force[0]), 0.0
+    for k, step in enumerate(np.diff(time), start=1):
+        kept = np.exp(-step / tau)
+        stretched = kept * stretch + tau / step * (1.0 - kept) * (force[k] - surface)
+        contact[k] = max(force[k] + share * stretched, 0.0)
+        if contact[k] > 0.0:
+            surface, stretch = float(force[k]), stretched
+        else:  # the surface has no force: it is at rest where the branch balances the force at rest
+            stretch -= (surface + share * stretch) / (1.0 + share)
+            stretch *= np.exp(-step / (tau * (1.0 + share)))
+            surface = -share * stretch
+    return contact
 
 
 def _small(random: Generator) -> tuple[float, float]:
@@ -335,6 +372,85 @@ def slip_stick_pair(random: Generator) -> Object:
     )
 
 
+def _with_stop(random: Generator, name: str, travel: float, scale: float, *, rotary: bool) -> Object:
+    """Returns a spring with some friction that ends in a hard stop, at which the tool turns."""
+    stop, stiff, loop = random.uniform(0.94, 0.985), random.uniform(20.0, 60.0), random.uniform(0.03, 0.1)
+
+    def shape(u: Array, s: Array) -> Array:
+        return u + (0.1 + loop * s) * -np.expm1(-u / 0.02) + stiff * bend(u, stop, 0.001)
+
+    return Object(name=name, shape=shape, travel=travel, scale=scale, rotary=rotary, leaves=not rotary)
+
+
+def slider_with_stop(random: Generator) -> Object:
+    return _with_stop(random, "slider with stop", *_small(random), rotary=False)
+
+
+def lever_with_stop(random: Generator) -> Object:
+    travel, scale = random.uniform(0.3, 4.0), 10.0 ** random.uniform(-2.0, 0.0)
+    return _with_stop(random, "lever with stop", travel, scale, rotary=True)
+
+
+def heavy_lever(random: Generator) -> Object:
+    """Returns a spring with a rotary inertia: its force at 3 Hz is 5 to 50 % of that of the spring."""
+    bow, share = random.uniform(0.0, 0.5), random.uniform(0.05, 0.5)
+
+    def shape(u: Array, s: Array) -> Array:
+        return u + bow * u**3
+
+    return Object(
+        name="heavy lever",
+        shape=shape,
+        travel=random.uniform(0.2, 0.5),
+        scale=10.0 ** random.uniform(-2.0, 0.0),
+        rotary=True,
+        lower=-1.0,
+        leaves=False,
+        hysteretic=False,
+        inertia=share / (2.0 * np.pi * 3.0) ** 2,
+    )
+
+
+def cogging_revolution(random: Generator) -> Object:
+    """Returns cogging over one to two revolutions, whose strongest wave is not the lowest."""
+    low, strongest = int(random.integers(1, 3)), int(random.integers(3, 7))
+    turns, phases = random.uniform(1.2, 2.2), random.uniform(0.0, 2.0 * np.pi, 3)
+    sizes = random.uniform(0.2, 0.6), 1.0, random.uniform(0.1, 0.4)
+
+    def shape(u: Array, s: Array) -> Array:
+        phase = 2.0 * np.pi * low * turns * u
+        waves = zip((1, strongest, 2 * strongest), sizes, phases, strict=True)
+        return np.asarray(sum(size * np.sin(k * phase + p) for k, size, p in waves))
+
+    return Object(
+        name="cogging revolution",
+        shape=shape,
+        travel=turns * 2.0 * np.pi,
+        scale=10.0 ** random.uniform(-2.5, -1.0),
+        rotary=True,
+        leaves=False,
+        hysteretic=False,
+        period=1.0 / (low * turns),
+        strongest=strongest,
+    )
+
+
+def elastomer(random: Generator) -> Object:
+    bow, loss = random.uniform(0.3, 1.5), random.uniform(0.03, 0.12)
+
+    def shape(u: Array, s: Array) -> Array:
+        return np.asarray((u + bow * u**2) * (1.0 + loss * s))
+
+    return Object(
+        name="elastomer",
+        shape=shape,
+        travel=random.uniform(3e-3, 2e-2),
+        scale=10.0 ** random.uniform(0.5, 2.0),
+        turning=0.02,
+        softening=random.uniform(0.1, 0.4),
+    )
+
+
 OBJECTS: tuple[Callable[[Generator], Object], ...] = (
     push_button,
     rubber_dome,
@@ -353,3 +469,6 @@ OBJECTS: tuple[Callable[[Generator], Object], ...] = (
     slip_stick_pair,
 )
 """Functions that return an object with random parameters"""
+
+ADDED_OBJECTS = (slider_with_stop, lever_with_stop, heavy_lever, cogging_revolution, elastomer)
+"""Further objects, which follow in the list of pairs"""

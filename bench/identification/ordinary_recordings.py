@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates how people record an object: sixteen operators, each a motion and a measuring chain."""
+"""Simulates how people record an object: 21 operators, each a motion and a measuring chain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
-from bench.identification.ordinary_objects import OBJECTS, Array, Object
+from bench.identification.ordinary_objects import ADDED_OBJECTS, OBJECTS, Array, Object
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import sawtooth
@@ -27,6 +28,9 @@ CREEP_S = 1.0
 JERKS = 40.0
 """Number of slips in the travel of an object with stick-slip"""
 
+ALL_FROM = 13540
+"""First draw of all pairs of object and operator; earlier draws keep the pairs that they had"""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -38,6 +42,8 @@ class Motion:
     """(n,) [m or rad]"""
     velocity: Array
     """(n,) [m/s or rad/s]"""
+    acceleration: Array
+    """(n,) [m/s^2 or rad/s^2]; 0 along strokes at constant speed, also at their turns"""
 
     @property
     def side(self) -> NDArray[np.int8]:
@@ -55,6 +61,8 @@ class Rows:
     """(n,) direction state, between -1 and 1 while the friction reverses"""
     force: Array
     """(n,) exact [N or N*m]"""
+    inertial: Array
+    """(n,) part of the exact force that accelerates the object [N or N*m]"""
     position_noise: Array
     force_noise: Array
     position_error: Array
@@ -73,6 +81,8 @@ class Rows:
     """True if the tool was held long enough to determine a memory"""
     lag_s: float | None = 0.0
     """Lag of the force [s]; None if it varies"""
+    mirrored: bool = False
+    """True if position and force are stored with the opposite sign"""
 
     @property
     def stroke(self) -> NDArray[np.intp]:
@@ -88,7 +98,7 @@ class Rows:
 
     def take(self, rows: NDArray[Any]) -> Rows:
         """Returns some of the rows."""
-        motion = Motion(self.motion.time[rows], self.motion.x[rows], self.motion.velocity[rows])
+        motion = Motion(*(getattr(self.motion, each.name)[rows] for each in fields(Motion)))
         arrays = {
             each.name: getattr(self, each.name)[rows]
             for each in fields(self)
@@ -102,25 +112,27 @@ class Rows:
             self.motion.x + self.position_noise + self.position_error,
             self.force + self.force_noise + self.force_error,
             self.directed,
+            -1.0 if self.mirrored else 1.0,
         )
 
     def clean(self) -> Recording:
         """Returns the recording of an operator without avoidable errors: strokes in contact, known direction.
 
         Rows while the friction reverses belong to neither stroke. An object with memory keeps its pauses,
-        because only they determine its time constants.
+        because only they determine its time constants. The force is that without inertia.
         """
         in_stroke = settled(self.state, self.motion.side) | (self.object.branch is not None)
         used = ~self.wrong & self.contact & in_stroke
         rows = self.take(used)
-        return rows._stored(rows.motion.x + rows.position_noise, rows.force + rows.force_noise, True)
+        force = rows.force - rows.inertial + rows.force_noise
+        return rows._stored(rows.motion.x + rows.position_noise, force, True)
 
-    def _stored(self, x: Array, force: Array, directed: bool) -> Recording:
+    def _stored(self, x: Array, force: Array, directed: bool, sign: float = 1.0) -> Recording:
         return Recording.from_arrays(
-            rounded(x, self.object.travel),
-            rounded(force, self.object.scale),
+            sign * rounded(x, self.object.travel),
+            sign * rounded(force, self.object.scale),
             self.motion.time if self.timed else None,
-            self.motion.side if directed else None,
+            sign * self.motion.side if directed else None,
             units=self.object.units,
         )
 
@@ -140,7 +152,8 @@ def along(knots: Array, at: Array, step: float) -> Motion:
     [s]."""
     time = np.arange(0.0, knots[-1], step)
     segment = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
-    return Motion(time, np.interp(time, knots, at), (np.diff(at) / np.diff(knots))[segment])
+    velocity = (np.diff(at) / np.diff(knots))[segment]
+    return Motion(time, np.interp(time, knots, at), velocity, np.zeros(len(time)))
 
 
 def strokes(
@@ -151,8 +164,10 @@ def strokes(
     hold_s: float = 0.0,
     approach: float = 0.0,
     wait: int = 0,
+    speeds: tuple[float, ...] = (1.0,),
+    leaving: float = 1.0,
 ) -> Motion:
-    """Returns one to three cycles of press and release at constant speed.
+    """Returns one to three cycles of press and release at constant speed, two or three if the object softens.
 
     Parameters
     ----------
@@ -166,6 +181,10 @@ def strokes(
         Way through air before and after the strokes [travels].
     wait : int
         Rows at rest before the first stroke.
+    speeds : tuple of float
+        Relative speeds, each of which has all cycles.
+    leaving : float
+        Relative speed of the releases.
     """
     travel, seconds = object.travel, 10.0 ** random.uniform(0.0, 1.0)
     rows = rows or 10.0 ** random.uniform(2.2, 2.9)
@@ -173,9 +192,10 @@ def strokes(
     step = seconds * (1.0 - object.lower) / rows
     way, now = [(0.0, lower - approach)], max(wait, 1) * step
     way.append((now, lower - approach))
-    for _ in range(random.integers(1, 4)):
-        for end in (1.0, lower):
-            now += seconds * abs(end - way[-1][1])
+    cycles = max(random.integers(1, 4), 2 if object.softening > 0.0 or leaving > 1.0 else 1)
+    for speed in np.repeat(speeds, cycles):
+        for end, faster in ((1.0, speed), (lower, speed * leaving)):
+            now += seconds * abs(end - way[-1][1]) / faster
             way += [(now, end), (now + hold_s, end)]
             now += hold_s
     way.append((now + seconds * approach + step, lower - approach))
@@ -185,8 +205,10 @@ def strokes(
 
 
 def hand_motion(object: Object, random: Generator) -> Motion:
-    """Returns a hand that presses three to ten times at a varying frequency between 0.2 and 3 Hz."""
-    cycles, frequency = random.integers(3, 11), 10.0 ** random.uniform(-0.7, 0.48)
+    """Returns a hand that presses three to ten times at a varying frequency, between 0.2 and 3 Hz, or between
+    1 and 6 Hz if the object has an inertia."""
+    slowest, fastest = (0.0, 0.78) if object.inertia > 0.0 else (-0.7, 0.48)
+    cycles, frequency = random.integers(3, 11), 10.0 ** random.uniform(slowest, fastest)
     step = max(1e-3, 0.5 / frequency / 10.0 ** random.uniform(2.0, 2.6))
     time = np.arange(0.0, cycles / frequency, step)
     knots = np.linspace(0.0, time[-1], cycles + 1)
@@ -195,7 +217,8 @@ def hand_motion(object: Object, random: Generator) -> Motion:
     depth = np.interp(time, knots, random.uniform(0.9, 1.0, cycles + 1))
     lower = -0.03 if object.leaves else object.lower
     x = object.travel * (lower + (1.0 - lower) * depth * (0.5 - 0.5 * np.cos(phase)))
-    return Motion(time, x, np.gradient(x, time))
+    velocity = np.gradient(x, time)
+    return Motion(time, x, velocity, np.gradient(velocity, time))
 
 
 def measured(object: Object, random: Generator, motion: Motion, **given: Any) -> Rows:
@@ -206,17 +229,19 @@ def measured(object: Object, random: Generator, motion: Motion, **given: Any) ->
     time, x, n = motion.time, motion.x, len(motion.x)
     last_moving = np.maximum.accumulate(np.where(motion.side != 0, time, 0.0))
     state = object.state(x) * (1.0 - CREEP * (1.0 - np.exp((last_moving - time) / CREEP_S)))
-    force = object.force(time, x, state, motion.velocity)
+    inertial = object.scale * object.inertia * motion.acceleration / object.travel
+    force = object.force(time, x, state, motion.velocity) * object.share_left(x) + inertial
     clean = Rows(
         object=object,
         motion=motion,
         state=state,
         force=force,
+        inertial=inertial,
         position_noise=random.normal(0.0, 10.0 ** random.uniform(-5.0, -3.7) * object.travel, n),
         force_noise=random.normal(0.0, 10.0 ** random.uniform(-3.0, -2.2) * np.ptp(force), n),
         position_error=np.zeros(n),
         force_error=np.zeros(n),
-        wrong=np.zeros(n, dtype=bool),
+        wrong=(x >= np.maximum.accumulate(x)) & (object.softening > 0.0),  # not yet softened
         **{"timed": random.random() < 0.7, "directed": random.random() < 0.4, **given},
     )
     phase = JERKS * x / object.travel + random.random(n)[clean.stroke]
@@ -325,7 +350,7 @@ def saturation(object: Object, random: Generator) -> Rows:
     rows = tester_or_hand(object, random)
     force = rows.force + rows.force_noise
     most = force.min() + random.uniform(0.6, 0.95) * np.ptp(force)
-    return replace(rows, force_error=np.minimum(most - force, 0.0), wrong=force > most)
+    return replace(rows, force_error=np.minimum(most - force, 0.0), wrong=rows.wrong | (force > most))
 
 
 def few_rows(object: Object, random: Generator) -> Rows:
@@ -354,9 +379,50 @@ def with_wrong_readings(rows: Rows, random: Generator, share: float) -> Rows:
         reading[wrong] += sign * random.uniform(0.05, 1.0, len(wrong)) * size
     else:
         reading[wrong] = 0.0
-    is_wrong = np.zeros(n, dtype=bool)
+    is_wrong = rows.wrong.copy()
     is_wrong[wrong] = True
     return replace(rows, force_error=reading - force, wrong=is_wrong)
+
+
+def encoder_steps(object: Object, random: Generator) -> Rows:
+    """Stores 4 to 30 steps of an encoder in a detent, or 200 to 4000 in the travel."""
+    rows = tester_or_hand(object, random)
+    if object.period is None:
+        share = 10.0 ** -random.uniform(2.3, 3.6)
+    else:
+        share = object.period / object.strongest / random.uniform(4.0, 30.0)
+    step = np.ceil(share / ROUNDED_TO) * ROUNDED_TO * object.travel  # equal steps in the stored numbers
+    stored = np.round((rows.motion.x + rows.position_noise) / step) * step
+    return replace(rows, position_noise=stored - rows.motion.x)
+
+
+def quick_leaving(object: Object, random: Generator) -> Rows:
+    """Presses, waits, leaves the object 10 to 50 times faster, and returns after another wait."""
+    hold_s, leaving = 10.0 ** random.uniform(-0.5, 0.5), 10.0 ** random.uniform(1.0, 1.7)
+    held = object.branch is not None and hold_s > object.branch[1]
+    motion = strokes(object, random, rows=10.0 ** random.uniform(2.7, 3.2), hold_s=hold_s, leaving=leaving)
+    rows = measured(object, random, motion)
+    return replace(rows, held=held and rows.timed)
+
+
+def jumping_angle(object: Object, random: Generator) -> Rows:
+    """Stores the angle of an encoder that starts again after each revolution; the first row is right."""
+    rows = tester_or_hand(object, random)
+    x, revolution = rows.motion.x + rows.position_noise, 2.0 * np.pi
+    least = object.lower * object.travel
+    zero = least + random.uniform(0.1, 0.9) * min(object.travel - least, revolution)
+    return replace(rows, position_error=zero - revolution + np.mod(x - zero, revolution) - x)
+
+
+def mirrored(object: Object, random: Generator) -> Rows:
+    """Stores position and force with the opposite sign."""
+    return replace(tester_or_hand(object, random), mirrored=True)
+
+
+def two_speeds(object: Object, random: Generator) -> Rows:
+    """Presses at one speed, then three to ten times faster."""
+    rows, fast = 10.0 ** random.uniform(2.5, 3.0), 10.0 ** random.uniform(0.5, 1.0)
+    return measured(object, random, strokes(object, random, rows=rows, speeds=(1.0, fast)), varied=True)
 
 
 OPERATORS: tuple[Callable[[Object, Generator], Rows], ...] = (
@@ -380,12 +446,35 @@ OPERATORS: tuple[Callable[[Object, Generator], Rows], ...] = (
 """Functions that record an object with random motion, noise and errors"""
 
 
-def drawn(draw: int) -> tuple[str, Rows]:
-    """Returns the name of the operator and the rows of a draw.
+ADDED_OPERATORS = (encoder_steps, quick_leaving, jumping_angle, mirrored, two_speeds)
+"""Further operators, which follow in the list of pairs"""
 
-    The numbers of objects and operators have no common divisor, so that 240 successive draws contain every
-    pair once.
-    """
+Pair = tuple[Callable[[Generator], Object], Callable[[Object, Generator], Rows]]
+
+
+def _applies(pair: Pair) -> bool:
+    """Returns True if the object of a pair can be left, or has an angle, where the operator needs it."""
+    known = pair[0](np.random.default_rng(0))
+    return {quick_leaving: known.leaves, jumping_angle: known.rotary}.get(pair[1], True)
+
+
+FIRST_PAIRS: tuple[Pair, ...] = tuple(
+    (OBJECTS[draw % len(OBJECTS)], OPERATORS[draw % len(OPERATORS)])
+    for draw in range(len(OBJECTS) * len(OPERATORS))
+)
+"""Pairs of the draws before ALL_FROM. The numbers of objects and operators have no common divisor, so that
+successive draws contain every pair once."""
+
+PAIRS: tuple[Pair, ...] = FIRST_PAIRS + tuple(
+    pair
+    for pair in product((*OBJECTS, *ADDED_OBJECTS), (*OPERATORS, *ADDED_OPERATORS))
+    if pair not in FIRST_PAIRS and _applies(pair)
+)
+
+
+def drawn(draw: int, pairs: Sequence[Pair] | None = None) -> tuple[str, Rows]:
+    """Returns the name of the operator and the rows of a draw: successive draws contain each pair once."""
+    pairs = pairs or (PAIRS if draw >= ALL_FROM else FIRST_PAIRS)
     random = np.random.default_rng([36, draw])
-    operator = OPERATORS[draw % len(OPERATORS)]
-    return operator.__name__.replace("_", " "), operator(OBJECTS[draw % len(OBJECTS)](random), random)
+    object, operator = pairs[draw % len(pairs)]
+    return operator.__name__.replace("_", " "), operator(object(random), random)
