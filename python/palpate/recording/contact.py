@@ -19,10 +19,9 @@ from .motion import (
 )
 
 
-def air_rows(position: Float1D, force: Float1D, waiting: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def air_rows(position: Float1D, force: Float1D, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Returns True (n,) for rows before the contact of the tool; positions and forces (n,) are in recorded
-    order, and `waiting` (n,) is True where the tool waits."""
-    moving = np.ones(len(position), dtype=np.bool_) if waiting is None or waiting.all() else ~waiting
+    order, and `moving` (n,) is True where the tool moves."""
     air = position < contact_at(position[moving], force[moving])
     return np.asarray(air & (air & moving).any())
 

@@ -98,6 +98,13 @@ class Motion:
         found = waits(self.position, self.time)
         return None if found is None else found[self.rows]
 
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """True (n,) for rows of the recording at which the tool moves; for all rows if none of them moves, or
+        if they have no order of a motion"""
+        waiting = self.waiting
+        return np.ones(len(self.rows), dtype=np.bool_) if waiting is None or waiting.all() else ~waiting
+
 
 @dataclass(frozen=True)
 class Conversion:
@@ -368,7 +375,8 @@ def converted(
     time = None if choice.time is None else conversion.si(choice.time, cells)
     if zero is not None:
         if zero == "air":
-            without_contact, where = air_rows(x, f, waits(x, time)), "the rows before the contact"
+            motion = Motion(x, time, np.arange(len(x)))
+            without_contact, where = air_rows(x, f, motion.moving), "the rows before the contact"
             if not without_contact.any():
                 raise InputError(
                     f"{name}: --zero air finds no rows before the contact; name them: START:STOP"

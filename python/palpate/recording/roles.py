@@ -65,12 +65,11 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     rows.
     """
     role = np.where(repeated_rows(recording), Role.REPEATED, Role.MOVING).astype(np.int8)
-    waiting = None if recording.input_names else recording.motion.waiting
-    if waiting is None or waiting.all():
+    if recording.input_names or recording.motion.waiting is None:
         return role
-    position = recording.position
-    contact = contact_at(position[~waiting], recording.force[~waiting])
-    role[waiting] = np.where(position <= contact, Role.REST, Role.HOLD)[waiting]
+    position, moving = recording.position, recording.motion.moving
+    contact = contact_at(position[moving], recording.force[moving])
+    role[~moving] = np.where(position <= contact, Role.REST, Role.HOLD)[~moving]
     if deepest is not None:
         role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
     return role

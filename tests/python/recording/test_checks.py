@@ -261,7 +261,7 @@ def magnet(sign: float, seed: int) -> palpate.Recording:
 def test_the_force_of_a_magnet_is_not_that_of_air(seed: int) -> None:
     repelling = magnet(1.0, seed)
     assert repelling.verdict.level == "good"
-    assert not air_rows(repelling.position, repelling.force, None).any()
+    assert not air_rows(repelling.position, repelling.force, repelling.motion.moving).any()
 
 
 def test_a_stated_attraction_needs_no_other_sign() -> None:

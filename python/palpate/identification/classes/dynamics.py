@@ -33,7 +33,7 @@ from ..log import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions
-from ..search.evidence import CRITERIA, CRITERION_NAMES, LEAST_GAIN, ON_HELD_OUT_ROWS, Moving
+from ..search.evidence import CRITERION_NAMES, LEAST_GAIN, Moving, deviance, on_fitted_rows
 
 FOLDS = 10
 """Number of groups of sections of the recording for a test of damping and mass; each group is held out once.
@@ -70,7 +70,7 @@ class FoldedRegression:
         rss = _rss(gram, columns, self._solution(gram, columns))
         share = max(rss / self._rows.sum(), self._least, TINY)
         p = min(len(columns), int(self._independent) - 2)
-        return self._independent * float(np.log(share)) + CRITERIA[criterion](self._independent, p)
+        return deviance(criterion, self._independent * share, self._independent, p)
 
     def solved(self, two_sided: bool, names: Sequence[str]) -> dict[str, float]:
         """Returns the fitted values of the named terms, mass or damping."""
@@ -159,7 +159,7 @@ class Dynamics:
         self._low_pass = low_pass or LowPass(1.0)
         self._parts = [] if low_pass is None else long_enough(parts, low_pass)
         self._data, self._evidence = data, options.search.evidence
-        self._criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+        self._criterion = on_fitted_rows(options.criterion)
         self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 

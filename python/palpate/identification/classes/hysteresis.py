@@ -28,7 +28,7 @@ from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
 from ..network.constraints import impose
 from ..options import IdentifyOptions
-from ..search.evidence import ON_HELD_OUT_ROWS, Candidate, Samples
+from ..search.evidence import Candidate, Samples, on_fitted_rows
 from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
@@ -114,9 +114,8 @@ class Hysteresis(ModelClass):
         their weights in the first one. A play radius must lower it as much as a model class, compared with
         the order of rows."""
         weight = one.error_on(one.data.weight).weight * (other.share > 0.0)
-        name, evidence = self._selection.judge.criterion, self._selection.options.search.evidence
-        if name in ON_HELD_OUT_ROWS:
-            name = "bic"
+        evidence = self._selection.options.search.evidence
+        name = on_fitted_rows(self._selection.judge.criterion)
 
         def value(candidate: Candidate) -> float:
             assert candidate.strokes is not None

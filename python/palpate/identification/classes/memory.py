@@ -27,7 +27,7 @@ from ...verdict import Finding, usable
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
-from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, deviance
+from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
 from .findings import USABLE_NRMSE
 from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
@@ -93,7 +93,7 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
     All branches relax, or all slip: together they would fit friction that creeps in a pause, and predict
     other motions badly.
     """
-    criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+    criterion = on_fitted_rows(options.criterion)
     kinds = [False] if recorded.ranges.log_tau is None else [True, False]
     found = [_grown(recorded, options, criterion, relaxes) for relaxes in kinds]
     rows = min(each.fit.independent(each.shape) for each in found)

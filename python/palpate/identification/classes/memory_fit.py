@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ..._core.model import ForceModel, play, stretches
 from ..._typing import Float1D, Float2D
 from ..data.compression import HELD_OUT_EVERY
-from ..data.limits import independent_share
-from ..search.evidence import CRITERIA
+from ..data.limits import independent_share, neighbour_correlation
+from ..search.evidence import deviance
 
 MOST_ROUGHNESS = 1e-3
 """Largest weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit
@@ -277,15 +277,14 @@ class MemoryFit:
     def independent(self, shape: Shape | None) -> float:
         """Returns the number of independent rows of a residual; that without branches for None."""
         residual = self.error(shape)
-        power = float(residual @ residual) + np.finfo(float).tiny
-        rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
+        rho = max(0.0, neighbour_correlation(residual))
         return max(LEAST_INDEPENDENT, independent_share(rho) * len(residual))
 
     def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
         """Returns the criterion of a memory."""
         mean = max(rss / self.n_rows, self.least)
         p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
-        return rows * float(np.log(mean)) + CRITERIA[criterion](rows, p)
+        return deviance(criterion, rows * mean, rows, p)
 
     def held_out_errors(self, shape: Shape) -> Float1D:
         """Returns the mean squared error on each held-out fifth of the sections, fitted without it.

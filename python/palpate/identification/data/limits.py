@@ -179,9 +179,7 @@ def independent_share(rho: float) -> float:
 def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> float:
     """Returns the BIC of a model with residuals (n,), from the errors of predicting each residual by the
     previous one; a mean squared prediction error below `least` is replaced by `least`."""
-    n, power = len(residual), max(float(residual @ residual), np.finfo(float).tiny)
-    rho = float(residual[1:] @ residual[:-1]) / power
-    new = residual[1:] - rho * residual[:-1]
+    n, new = len(residual), residual[1:] - neighbour_correlation(residual) * residual[:-1]
     return n * float(np.log(max(float(new @ new) / n, least))) + n_parameters * float(np.log(n))
 
 

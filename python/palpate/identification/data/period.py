@@ -13,6 +13,7 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.conversion import MIN_ROWS
 from ...recording.motion import directions_of
+from .limits import standard_deviation
 
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
@@ -102,10 +103,10 @@ def _strokes(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D, Float1D
     the direction is not known or the force has further inputs."""
     strokes = [np.zeros((3, 0))]
     for each in recordings:
-        way, waiting = directions_of(each), each.motion.waiting
+        way = directions_of(each)
         if way is None or len(each.input_names):
             return np.zeros(0), np.zeros(0), np.zeros(0)
-        moving = (way != 0) & (True if waiting is None else ~waiting)
+        moving = (way != 0) & each.motion.moving
         strokes.append(np.array([each.position, each.force, way])[:, moving])
     position, force, side = np.concatenate(strokes, axis=1)
     return position, force, side
@@ -155,7 +156,7 @@ def _fitted(
         # A tenth of a wave over the travel, so that the fit stays at its minimum.
         bound = 0.1 * period**2 / order[0]
         period += float(np.clip(change, -bound, bound))
-        scale = max(BIWEIGHT * 1.4826 * float(np.median(np.abs(residual))), tiny)
+        scale = max(BIWEIGHT * standard_deviation(residual), tiny)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
     return period
 

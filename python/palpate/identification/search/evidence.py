@@ -67,6 +67,11 @@ ON_HELD_OUT_ROWS = ("fresh", "perceptual")
 """Criteria that use the error on held-out rows."""
 
 
+def on_fitted_rows(criterion: str) -> str:
+    """Returns the criterion for comparisons on the rows of the fit: BIC in place of one on held-out rows."""
+    return "bic" if criterion in ON_HELD_OUT_ROWS else criterion
+
+
 def deviance(criterion: str, rss: float, n: float, p: int) -> float:
     """Returns the value of a criterion, n ln(rss/n) + penalty(n, p), from the residual sum of squares rss
     [force^2] of n samples and the number of parameters p.

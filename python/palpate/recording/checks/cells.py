@@ -63,12 +63,9 @@ class Checked:
         few rows belong to a stroke."""
         if self.recording.input_names:
             return None
-        waiting = self.recording.motion.waiting
-        if waiting is None:
-            return cell_rows(self.recording)
-        moving = np.flatnonzero(~waiting)
-        cells = cell_rows(self.recording.without(waiting)) if len(moving) else None
-        return None if cells is None else replace(cells, row=moving[cells.row])
+        moving = self.recording.motion.moving
+        cells = cell_rows(self.recording.without(~moving))
+        return None if cells is None else replace(cells, row=np.flatnonzero(moving)[cells.row])
 
 
 @dataclass(frozen=True)

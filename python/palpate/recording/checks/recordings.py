@@ -86,17 +86,11 @@ class _Strokes:
         `side` (n,) is the direction of the rows; with None the result of :func:`sides` is used.
         """
         signs = sides(recording) if side is None else side
-        moving = _moving(recording)
+        moving = recording.motion.moving  # in a wait the force relaxes
         into, out = moving & (signs > 0), moving & (signs < 0)
         direction = int(into.any()) - int(out.any())
         rows = {0: moving, 1: into, -1: out}
         return _Strokes(direction, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
-
-
-def _moving(recording: Recording) -> NDArray[np.bool_]:
-    """Returns True for the rows at which the tool moves: in a wait the force relaxes."""
-    waiting = recording.motion.waiting
-    return np.ones(len(recording), dtype=bool) if waiting is None or waiting.all() else ~waiting
 
 
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:

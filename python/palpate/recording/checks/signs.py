@@ -157,7 +157,7 @@ def force_without_contact(checked: Checked) -> list[Finding]:
     be that of an object which pulls.
     """
     recording = checked.recording
-    air = air_rows(recording.position, recording.force, recording.motion.waiting)
+    air = air_rows(recording.position, recording.force, recording.motion.moving)
     if recording.input_names or np.count_nonzero(air) < LEAST_STROKE_ROWS:
         return []
     mean = float(recording.force[air].mean())
