@@ -17,7 +17,7 @@ import numpy as np
 
 from ..baselines import Compared, compare
 from ..identification import identify as identify_model
-from ..identification.classes.findings import error_findings
+from ..identification.classes.findings import error_findings, error_text
 from ..identification.identify_files import identify_files
 from ..identification.options import (
     CHOICES,
@@ -35,8 +35,8 @@ from ..recording.files import CELL_BYTES, TooLargeError, require_memory
 from ..recording.formats import is_read_in_parts
 from ..recording.units import POSITION_UNITS, UNSTATED_UNIT, Unit, symbols_of, unit_of
 from ..verdict import Verdict
-from ..verification import Verification, verify
-from ..verification.verification import circumstances
+from ..verification import verify
+from ..verification.verification import circumstances, errors_of
 from .exit_status import end_with, finishing
 from .figures import drawing, picture_verification
 from .printing import (
@@ -334,11 +334,14 @@ def identify(
     verified = []
     if hold_out_every is not None or plot is not None:
         verified = [(recording, verify(model, recording)) for recording in judged_on]
-    nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
+    nrmse, settled, rms = model.fit.nrmse, model.notes["settled_nrmse"], ""
     compared = sum(verification.n for _, verification in verified)
     verdict = model.verdict
     if hold_out_every is not None:
-        verdict += Verdict(tuple(error_findings(nrmse, f"{compared} held-out rows")))
+        error, judged_error = errors_of([found for _, found in verified])
+        nrmse, settled = error.nrmse, judged_error.nrmse
+        rms = f"RMS {verified[0][0].file_unit('force').text(error.rmse)}, "
+        verdict += Verdict(tuple(error_findings(settled, f"{compared} held-out rows")))
         verdict += Verdict(tuple(chain.from_iterable(circumstances(model, *each) for each in verified)))
     result = {
         "model": str(output),
@@ -347,6 +350,7 @@ def identify(
         "model_class": model.fit.model_class,
         "stop_reason": model.stop_reason,
         "nrmse": nrmse,
+        "settled_nrmse": settled,
         "verdict": str(verdict),
         "seconds": seconds,
     }
@@ -370,8 +374,6 @@ def identify(
         left_out = f", {number(left_out_nrmse)} on rows left out of the fit"
     if hold_out_every is None and (shift_nrmse := model.notes["shift_nrmse"]):
         left_out += f", {number(shift_nrmse)} if press and release are shifted"
-    # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
-    rms = "" if hold_out_every is None else _rms_text(verified)
     with drawing() as write_figures:
         if plot is not None:
             picture_verification(plot, model, verified, recordings)
@@ -386,7 +388,7 @@ def identify(
                 {
                     "model": f"{output}: {model.fit.model_class}, {model.terms}, "
                     f"{model.n_parameters} parameters",
-                    "error": f"{rms}NRMSE {number(nrmse)} on {judged}{left_out}",
+                    "error": f"{rms}{error_text(nrmse, settled, judged)}{left_out}",
                     **({"rows": " ".join(rows_left_out).removesuffix(".")} if rows_left_out else {}),
                     **_outside_text(model, recordings),
                     **_band_text(model, recordings),
@@ -488,19 +490,6 @@ def _require_unused(**others: Any) -> None:
                 f"--{name.replace('_', '-')} needs all rows at once, and these files are read part by part; "
                 "palpate verify compares the model with a recording"
             )
-
-
-def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
-    """Returns the RMS force error of all rows in the unit of the file, as "RMS 0.02 N*m, "."""
-    rms = float(np.sqrt(np.mean(np.concatenate([found.residual for _, found in verified]) ** 2)))
-    return f"RMS {verified[0][0].file_unit('force').text(rms)}, "
-
-
-def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
-    """Returns the NRMSE of the model's force for the rows of all recordings together."""
-    residual = np.concatenate([verification.residual for _, verification in verified])
-    force = np.concatenate([recording.force[verification.rows] for recording, verification in verified])
-    return float(np.sqrt(np.mean(residual**2)) / np.std(force))
 
 
 def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:

@@ -405,6 +405,7 @@ def model_of(
                 *([network.shift.note] if network.shift and not network.shift.perceptible else []),
                 *network.band_check,
             ],
+            "settled_nrmse": network.settled_nrmse[0],
             "left_out_nrmse": network.left_out_nrmse,
             "shift_nrmse": network.shift.nrmse if network.shift else 0.0,
             "error_rows": network.residuals,

@@ -103,21 +103,30 @@ class Informative:
     ----------
     recordings : sequence of Recording
         Recordings of one kind of object.
+    lower : float, optional
+        Lower end of a model with which the rows are compared. Rows far from the contact are then dropped only
+        below it, and repeats at which the tool waits are kept as waits.
     """
 
-    def __init__(self, recordings: Sequence[Recording]) -> None:
+    def __init__(self, recordings: Sequence[Recording], lower: float | None = None) -> None:
         self.recordings = list(recordings)
         self._given = tuple(recordings)
-        self._kept = [np.arange(len(each)) for each in recordings]
+        self.kept = [np.arange(len(each)) for each in recordings]
         """Rows of each given recording that are left"""
         self._dropped: dict[tuple[int, str], NDArray[np.intp]] = {}
         """Rows that were dropped, by the number of the recording and the reason"""
         for number, recording in enumerate(recordings):
-            self._drop(number, repeated_rows(recording), "repeated")
+            counted = lower is None or recording.motion.moving
+            self._drop(number, repeated_rows(recording) & counted, "repeated")
         self.drop_wrong_readings()
+        self.drop_approach(np.inf if lower is None else lower)
+
+    def drop_approach(self, below: float = np.inf) -> None:
+        """Drops rows that are far from the contact, below a position."""
         deepest = max(float(each.position.max()) for each in self.recordings)
         for number, recording in enumerate(self.recordings):
-            self._drop(number, roles_of(recording, deepest) == Role.APPROACH, "approach")
+            far = roles_of(recording, deepest) == Role.APPROACH
+            self._drop(number, far & (recording.position < below), "approach")
 
     @property
     def dropped(self) -> dict[str, int]:
@@ -156,8 +165,8 @@ class Informative:
         """Drops rows (n,) of one recording."""
         if rows.any():
             before = self._dropped.get((number, reason), np.empty(0, dtype=np.intp))
-            self._dropped[number, reason] = np.append(before, self._kept[number][rows])
-            self._kept[number] = self._kept[number][~rows]
+            self._dropped[number, reason] = np.append(before, self.kept[number][rows])
+            self.kept[number] = self.kept[number][~rows]
             self.recordings[number] = self.recordings[number].without(rows)
 
     def _reading(self, number: int, row: int) -> str:

@@ -139,7 +139,7 @@ class Stroke:
     """Two forces along one stroke: those of two models, or the mean ones of a recording and a model."""
 
     name: str
-    """Name of the stroke: press, release or hold; empty if these are not distinguished"""
+    """Name of the stroke: press or release; empty if these are not distinguished"""
     position: Float1D
     """(n,) positions of the forces [m or rad]"""
     first: Float1D
@@ -208,15 +208,16 @@ def mean_forces(
     position, reference, force : (n,) array
         Position, recorded and modelled force of the rows.
     side : (n,) array, optional
-        Positive in the press, negative in the release, 0 in a hold.
+        Positive in the press, negative in the release, 0 in neither: such rows are left out if others have a
+        direction.
     """
     signs = np.zeros(len(position), dtype=np.int8) if side is None else np.sign(side).astype(np.int8)
-    names = {0: "" if side is None else "hold", 1: "press", -1: "release"}
+    names = {0: "", 1: "press", -1: "release"}
     width = float(np.ptp(position)) or 1.0
     scaled = STIFFNESS_CELLS * (position - position.min()) / width
     cell = np.minimum(scaled.astype(int), STIFFNESS_CELLS - 1)
     strokes = []
-    for sign in np.unique(signs).tolist():
+    for sign in np.unique(signs[signs != 0] if signs.any() else signs).tolist():
         of_stroke = signs == sign
         rows = np.bincount(cell[of_stroke])
         sums = [np.bincount(cell[of_stroke], each[of_stroke]) for each in (position, reference, force)]

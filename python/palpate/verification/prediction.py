@@ -56,11 +56,11 @@ class Prediction:
     position: Float1D
     """(k,) positions at which the force was computed"""
     side: Float1D | None = None
-    """(k,) direction state in [-1, 1]; None for a model without hysteresis, or with mass or damping"""
+    """(k,) direction state in [-1, 1]; None for a model without hysteresis"""
     over_time: bool = False
     """True if the force depends on the earlier positions, because the model has a memory"""
     without_motion: int = 0
-    """Number of rows at which the tool waits or is far from the object"""
+    """Number of rows at which the tool waits or is far from the object, or that are dropped"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
@@ -94,16 +94,13 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 def _informative(model: Model, recording: Recording, found: Prediction) -> Prediction:
     """Leaves out the rows that show no force over position, as the identification does.
 
-    An approach is compared inside the domain of the model, a wait with a model with memory, except in the air
-    below this domain.
+    A wait is compared with a model with memory, except in the air below its domain.
     """
-    role = roles_of(recording, float(recording.position.max()))
-    below = recording.position < model.lower[0]
-    role[(role == Role.APPROACH) & ~below] = Role.MOVING
+    role = roles_of(recording)
     moving = compared = role == Role.MOVING
     if model.memory is not None:
-        in_air = below & (model.below == "free")
-        compared = moving | (role == Role.HOLD) | ((role == Role.REST) & ~in_air)
+        inside = recording.position >= model.lower[0]
+        compared = moving | (np.isin(role, (Role.HOLD, Role.REST)) & inside)
     kept, moves = compared[found.rows], moving[found.rows]
     if not moves.any():
         return found
@@ -146,7 +143,8 @@ def _moving(model: Model, recording: Recording, play_radius: float | None) -> Pr
     left_out = int(np.count_nonzero(static.rows & ~known))
     notes = (NO_VELOCITY.format(left_out),) if left_out else ()
     position = recording.position[rows]
-    return Prediction(rows, force, _extrapolated(model, position), static.notes + notes, position)
+    side = None if static.side is None else static.side[known[static.rows]]
+    return Prediction(rows, force, _extrapolated(model, position), static.notes + notes, position, side)
 
 
 def _static(model: Model, recording: Recording, play_radius: float | None) -> Prediction:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,14 +15,19 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..frames import pd
 from ..html_table import Curve, html_table
-from ..identification.classes.findings import USABLE_NRMSE, error_findings
+from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text
 from ..identification.data.rows import require_in_range
+from ..identification.data.strokes import weights_of_shared_errors
+from ..identification.options import SearchOptions
+from ..identification.search.evidence import RowError
 from ..model import Model
 from ..model.band import BAND_LEVEL
 from ..recording import Recording, Source
 from ..recording.checks import quality_findings
 from ..recording.files import free_name
+from ..recording.motion import ordered_strokes
 from ..recording.reading import RecordingLike, recording_from
+from ..recording.roles import Informative
 from ..recording.units import COLUMN_SUFFIX, Unit
 from ..verdict import GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
@@ -54,6 +59,9 @@ LEAST_SHARE_IN_BAND = 0.5
 """Share of rows in the band of the model below which the recording is not one of the same object [-]. The
 rows of one recording differ from the model in a similar way, so that single repeats can have fewer than 95
 %."""
+
+MOST_SHARED = 0.5
+"""Largest weight of a row whose error is mostly one that it shares with the other rows behind turns [-]."""
 
 STRUCTURED_CORRELATION = 0.5
 """Lag-1 autocorrelation above which the error is structured [-]."""
@@ -98,10 +106,14 @@ class Verification:
     """Force of the model at the evaluated rows"""
     residual: Float1D = field(repr=False, compare=False, kw_only=True)
     """(n,) force of the model minus the recorded one"""
+    weight: Float1D = field(repr=False, compare=False, kw_only=True)
+    """(n,) weight of each evaluated row in the error that the verdict uses, from 0 to 1"""
     band: Float1D | None = field(repr=False, compare=False, kw_only=True)
     """(n,) half width of the band of the model about its force; None without band"""
     recording: Recording = field(repr=False, compare=False, kw_only=True)
     """The recording with which the model was compared, with all its rows"""
+    dropped: tuple[str, ...] = field(default=(), kw_only=True)
+    """Sentences on rows that are dropped, such as wrong readings"""
 
     @property
     def rows(self) -> NDArray[np.bool_]:
@@ -116,9 +128,25 @@ class Verification:
     @property
     def strokes(self) -> tuple[Stroke, ...]:
         """Recorded and modelled force along each stroke, as means over cells of the positions"""
-        recording, rows = self.recording, self.rows
-        side = self.prediction.side if recording.direction is None else recording.direction[rows]
-        return mean_forces(recording.position[rows], side, recording.force[rows], self.force)
+        return self._strokes(np.ones(self.n, dtype=bool))
+
+    @property
+    def judged_strokes(self) -> tuple[Stroke, ...]:
+        """The same without the rows behind turns that share an error"""
+        return self._strokes(self.weight > MOST_SHARED)
+
+    def _strokes(self, kept: NDArray[np.bool_]) -> tuple[Stroke, ...]:
+        recording, rows = self.recording, np.flatnonzero(self.rows)[kept]
+        side = self.prediction.side if recording.direction is None else recording.direction[self.rows]
+        side = None if side is None else side[kept]
+        return mean_forces(recording.position[rows], side, recording.force[rows], self.force[kept])
+
+    @property
+    def settled_nrmse(self) -> float:
+        """NRMSE that the verdict uses: as `nrmse`, but rows behind turns share an error if the direction of
+        the model changes at once there [-]"""
+        whole = bool((self.weight == 1.0).all())
+        return self.nrmse if whole else errors_of([self])[1].nrmse
 
     @property
     def file_units(self) -> tuple[Unit, Unit]:
@@ -144,11 +172,13 @@ class Verification:
         position = position_unit.text(float(recording.position[self.rows][worst]))
         band = {} if self.within_band is None else {"band": f"{self.within_band:.1%} of the rows are inside"}
         return {
-            "error": f"RMS {force_unit.text(self.rmse)}, NRMSE {self.nrmse:.4g}",
+            "error": f"RMS {force_unit.text(self.rmse)}, "
+            + error_text(self.nrmse, self.settled_nrmse, f"{self.n} rows"),
             "largest": f"{force_unit.text(self.worst)} in one row, at position {position}",
             "felt": most_noticed(self.strokes).noticed(position_unit, force_unit),
             **band,
             "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} extrapolated",
+            **({"dropped": " ".join(self.dropped).removesuffix(".")} if self.dropped else {}),
             "recording": self._freshness,
         }
 
@@ -189,7 +219,8 @@ def verify(
     direction: npt.ArrayLike | None = None,
     play_radius: float | None = None,
 ) -> Verification:
-    """Compares a model with a recording, row by row.
+    """Compares a model with a recording, row by row, as an identification states its error: wrong readings
+    are dropped first, and rows that wait are not compared.
 
     Parameters
     ----------
@@ -221,8 +252,9 @@ def verify(
     recording = recording_from(recording, force, time, direction, inputs=columns_of(model))
     require_in_range("position", recording.position)
     require_in_range("force", recording.force)
-    prediction = predict(model, recording, play_radius=play_radius)
-    rows = prediction.rows
+    informative, prediction, weight = _compared(model, recording, play_radius)
+    rows, dropped = prediction.rows, tuple(informative.notes)
+    informative.drop_approach()
     reference = recording.force[rows]
     residual = prediction.force - reference
     if not np.isfinite(residual).all():
@@ -230,7 +262,7 @@ def verify(
     rmse = root_mean_square(residual)
     nrmse = normalised(rmse, reference)
     fresh = is_fresh(model.data, recording.source)
-    notes = prediction.notes
+    notes = dropped + prediction.notes
     if not fresh:
         notes += ("The model was identified on this recording: this is not a fresh recording.",)
     found = Verification(
@@ -251,10 +283,58 @@ def verify(
         notes=notes,
         prediction=prediction,
         residual=residual,
+        weight=weight,
+        dropped=dropped,
         band=model.band_half_width(prediction.position),
         recording=recording,
     )
-    return replace(found, verdict=Verdict(findings_of(model, recording, found)))
+    return replace(found, verdict=Verdict(findings_of(model, found, informative.recordings[0])))
+
+
+def _compared(
+    model: Model, recording: Recording, play_radius: float | None = None
+) -> tuple[Informative, Prediction, Float1D]:
+    """Returns the recording without the rows that an identification drops, the force of the model at its
+    rows, and the weight of each evaluated row in the error.
+
+    Rows behind turns share an error if the direction of the model changes at once there. A play operator
+    states how friction reverses, so that these rows count whole.
+    """
+    informative = Informative([recording], float(model.lower[0]))
+    for last in (False, True):
+        (kept,) = informative.recordings
+        found = predict(model, kept, play_radius=play_radius)
+        at, residual = np.flatnonzero(found.rows), kept.force[found.rows] - found.force
+        shared = _shared_weights(kept, found, residual)
+        between = np.interp(np.arange(len(kept)), at, shared * residual)
+        if last or not informative.drop_wrong_readings([between]):
+            break
+    rows = np.zeros(len(recording), dtype=bool)
+    rows[informative.kept[0][at]] = True
+    follows = found.side is not None and bool((np.abs(found.side) != 1.0).any())
+    found = replace(found, rows=rows, without_motion=found.without_motion + len(recording) - len(kept))
+    return informative, found, np.ones(len(shared)) if follows else shared
+
+
+def _shared_weights(recording: Recording, found: Prediction, residual: Float1D) -> Float1D:
+    """Returns the weights (k,) of the evaluated rows, with residuals (k,), in an error that rows behind turns
+    share; 1 each without directions."""
+    if found.side is None or (order := ordered_strokes(recording)) is None or not len(residual):
+        return np.ones(len(residual))
+    rows, all_residuals = found.rows, np.zeros(len(recording))
+    all_residuals[rows] = residual
+    path = (recording.position - found.position.min()) / (np.ptp(found.position) or 1.0)
+    order, share = np.where(rows, order, 0.0), SearchOptions.contact_share
+    return weights_of_shared_errors(path, order, all_residuals, recording.force, share)[rows]
+
+
+def errors_of(verified: Sequence[Verification]) -> tuple[RowError, RowError]:
+    """Returns the error of all evaluated rows together, each of them whole, and the error that the verdict
+    uses."""
+    residual = np.concatenate([each.residual for each in verified])
+    force = np.concatenate([each.recording.force[each.rows] for each in verified])
+    judged = RowError(residual, force, np.concatenate([each.weight for each in verified]))
+    return replace(judged, weight=np.ones(len(force))), judged
 
 
 def columns_of(model: Model) -> list[str]:
@@ -284,12 +364,18 @@ def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Fl
     return float(np.mean(known)) if known else None
 
 
-def findings_of(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:
-    """Returns all findings of a verification; a defect of the recording limits what it shows of a model."""
+def findings_of(model: Model, found: Verification, kept: Recording) -> tuple[Finding, ...]:
+    """Returns all findings of a verification; a defect of the recording, without dropped rows, limits what it
+    shows of a model. The recording of the identification shows what its findings say, unless the error is
+    larger than they state."""
+    known = Verdict() if found.fresh else model.verdict
+    error = Verdict(tuple(error_findings(found.settled_nrmse, f"{found.n} rows")))
+    of_error = (*error.findings, *_of_cause(model, found.recording, found))
     return (
-        *error_findings(found.nrmse, f"{found.n} rows"),
-        *circumstances(model, recording, found),
-        *quality_findings(recording, attracts=model.below == "linear"),
+        *known.findings,
+        *(of_error if found.fresh or (error + known != known and error.level != known.level) else ()),
+        *_of_rows(model, found.recording, found),
+        *quality_findings(kept, attracts=model.below == "linear"),
     )
 
 
@@ -323,7 +409,7 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
         )
     flight = flight_of(recording)
     if flight.object_position is not None and not flight.predicted:
-        handle = predict(model, replace(recording, columns={}))
+        _, handle, _ = _compared(model, replace(recording, columns={}))
         reference = recording.force[handle.rows]
         handle_nrmse = normalised(root_mean_square(handle.force - reference), reference)
         if handle_nrmse > USABLE_NRMSE:
@@ -357,7 +443,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
                 "position or device. Few repeats of one object differ this much"
             )
         )
-    if found.nrmse > USABLE_NRMSE:
+    if found.settled_nrmse > USABLE_NRMSE:
         known = {
             "velocity": model.of_velocity,
             "hysteresis": model.hysteretic,
@@ -376,7 +462,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
                     f"same, or the force depends on an input that the model does not have, such as {missing}"
                 )
             )
-    return [*findings, *noticed_findings(found.strokes, *found.file_units)]
+    return [*findings, *noticed_findings(found.judged_strokes, *found.file_units)]
 
 
 def _domain(model: Model, recording: Recording) -> str:

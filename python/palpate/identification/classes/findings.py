@@ -18,12 +18,13 @@ from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
+from ..data.strokes import weights_of_shared_errors
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate, deviance
+from ..search.evidence import Candidate, RowError, deviance
 from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .dynamics import LEAST_SPEED_SPREAD, spread_of_speeds
 from .repeatability import band_with_check, left_out_residual
@@ -50,6 +51,15 @@ def error_findings(nrmse: float, rows: str, cure: str = "") -> list[Finding]:
             f"explains {explained:.0%} of the variance of the force{cure}"
         )
     ]
+
+
+def error_text(nrmse: float, settled: float, rows: str) -> str:
+    """Returns the statement of an error: the NRMSE of all rows, each of them whole, and the NRMSE that the
+    verdict uses if it differs."""
+    text = f"NRMSE {nrmse:.4g} on {rows}"
+    if f"{settled:.2g}" != f"{nrmse:.2g}":
+        text += f", {settled:.4g} if rows behind turns, where friction reverses, share one error"
+    return text
 
 
 def verdict_of(
@@ -477,6 +487,18 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     ]
 
 
+def _judged_error(best: Candidate, contact_share: float) -> RowError:
+    """Returns the error that the verdict uses, as a verification computes it: rows behind turns share an
+    error that is left there. A play radius states how friction reverses, so that these rows count whole."""
+    error, data = best.error, best.data
+    if best.strokes is None or best.strokes.weight is None or best.play_radius is not None:
+        return error
+    assert data.order is not None
+    order = data.order * data.fitted
+    weight = weights_of_shared_errors(data.path[:, 0], order, best.residual, data.force, contact_share)
+    return replace(error, weight=error.weight * weight)
+
+
 def identified(selection: ClassSelection) -> FittedNetwork:
     """Returns the accepted network in the units of the recording, with its error on the rows, all notes and
     findings."""
@@ -501,7 +523,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or place_findings(best, options.hysteresis_nonnegative)
     )
     share, left_out = np.where(data.fitted, best.share, 1.0), left_out_residual(selection)
-    settled = best.settled
+    settled = _judged_error(best, options.search.contact_share)
     if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":
         notes.append(
             "Rows behind turns share an error, because friction reverses there, and count less in the fit: "
@@ -518,7 +540,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=replace(error, weight=share).rmse,
-        settled_rmse=settled.rmse,
+        settled_rmse=best.settled.rmse,
         settled_nrmse=(settled.nrmse, replace(settled, residual=left_out).nrmse),
         residual=best.residual,
         share=share,

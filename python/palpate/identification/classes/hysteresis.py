@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...errors import InputError
-from ...recording.motion import FORCE_RESOLUTION
 from ...verdict import usable
 from ..data.limits import evenly_spread
 from ..data.strokes import (
@@ -22,7 +21,7 @@ from ..data.strokes import (
     HysteresisInput,
     settled_rows,
     turns_before,
-    weights_behind_turns,
+    weights_of_shared_errors,
 )
 from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
@@ -202,16 +201,14 @@ class Hysteresis(ModelClass):
         """Returns direction states with weights of the rows behind turns, from fits of given wavelets, each
         with the weights before."""
         data, samples = self._selection.data, self._selection.samples
-        reach = float(np.ptp(data.force[data.fitted]))
-        if data.order is None or strokes.weight is not None or reach == 0.0:
+        if data.order is None or strokes.weight is not None:
             return strokes
-        order = data.order * data.fitted
-        touched = np.abs(data.force) > self._selection.options.search.contact_share * reach
+        order, share = data.order * data.fitted, self._selection.options.search.contact_share
         for _ in range(REWEIGHTINGS):
             problem = samples.problem(samples.rows(strokes), strokes)
             found = self._selection.candidate(self.name, problem, problem.solve(basis), "", strokes=strokes)
-            residual, least = data.force - found.force_at(), FORCE_RESOLUTION * reach
-            weight = weights_behind_turns(data.path[:, 0], order, residual, touched, least)
+            residual = data.force - found.force_at()
+            weight = weights_of_shared_errors(data.path[:, 0], order, residual, data.force, share)
             strokes = replace(strokes, weight=weight)
         return strokes
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import ordered_strokes, states_its_order, turns_of
+from ...recording.motion import FORCE_RESOLUTION, ordered_strokes, states_its_order, turns_of
 from ...verdict import usable
 from ..log import Decision, Log
 
@@ -308,6 +308,22 @@ def weights_behind_turns(
         here = expected[part] / (expected[part] + shared * np.bincount(part)[part])
         weight[moving] = np.minimum(weight[moving], here)
     return weight
+
+
+def weights_of_shared_errors(
+    path: Float1D, order: Float1D, residual: Float1D, force: Float1D, contact_share: float
+) -> Float1D:
+    """Returns the weights (n,) of `weights_behind_turns` for rows with forces (n,), in the fit and in the
+    error that is stated; 1 each for a constant force.
+
+    The tool touches the object where |force| is above `contact_share` of its range in the strokes.
+    """
+    moving = order != 0.0
+    reach = float(np.ptp(force[moving])) if moving.any() else 0.0
+    if reach == 0.0:
+        return np.ones(len(path))
+    touched = np.abs(force) > contact_share * reach
+    return weights_behind_turns(path, order, residual, touched, FORCE_RESOLUTION * reach)
 
 
 @dataclass(frozen=True)
