@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of Mexican hats for one instruction set. hat_sum.hpp includes this file once for each instruction set, with
+// Sums of Mexican hats for one instruction set. hat_kernels.hpp includes this file once for each instruction set, with
 // PALPATE_KERNEL the namespace, PALPATE_LANES doubles in a register, PALPATE_TARGET a function attribute. The file has
 // no include guard, because it is included several times. Every function with vectors has the attribute PALPATE_TARGET,
 // because otherwise the compiler does not keep its vectors in registers of PALPATE_LANES doubles.
