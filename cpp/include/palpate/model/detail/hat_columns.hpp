@@ -81,6 +81,7 @@ struct RadialExpansion {
 
 /// Functions that compute sums of Mexican hat wavelets, compiled for one instruction set of the processor.
 struct HatKernel {
+    int lanes;  ///< doubles in a register
     void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
     /// Functions that compute the sum of the wavelets at many positions, one function for each `HatQuantity`
     std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3> batch;

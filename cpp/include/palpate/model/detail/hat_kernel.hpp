@@ -313,7 +313,8 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
 
 /// Returns the functions that compute sums of Mexican hats with this instruction set of the processor.
 [[nodiscard]] inline HatKernel kernel() noexcept {
-    return {at,
+    return {PALPATE_LANES,
+            at,
             {batch<HatQuantity::Force>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},
             radial,
             expansion,

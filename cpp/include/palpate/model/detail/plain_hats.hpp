@@ -106,11 +106,8 @@ inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
 }
 
 [[nodiscard]] inline HatKernel kernel() noexcept {
-    return {at,
-            {batch<&Curve::value>, batch<&Curve::slope>, batch<&Curve::integral>},
-            radial,
-            expansion,
-            gaussians};
+    return {1,      at,        {batch<&Curve::value>, batch<&Curve::slope>, batch<&Curve::integral>},
+            radial, expansion, gaussians};
 }
 
 }  // namespace palpate::detail::plain
