@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
+from ...recording.motion import resolution_of
 from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
+from ..data.limits import distinct_rows
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.basis import Basis
 from ..network.separable import SeparableProblem, Solution, problem_of
@@ -130,7 +132,8 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     """Returns the residual (n,) of rows that are left out of the fit, a fifth of them at a time.
 
     A network of few rows is grown again on the other rows. The numbers of another model are fitted again to
-    them by a few steps. Rows with correlated noise are left out together.
+    them by a few steps. Rows with correlated noise are left out together, and so are all rows at one position
+    in one direction: a row whose position is known from another stroke does not test the force between rows.
     """
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
@@ -144,8 +147,12 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     )
     rows = np.flatnonzero(used)
     together = max(1, round(len(rows) / best.problem.independent))
+    place = [np.rint(column / resolution_of(column)) for column in data.box[rows].T]
+    first, at_place, _ = distinct_rows(
+        np.column_stack(place if best.side is None else [*place, np.sign(best.side[rows])])
+    )
     fold = np.full(len(used), -1)
-    fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
+    fold[rows] = (first // together % HELD_OUT_EVERY)[at_place]
     residual, growth = best.error.residual.copy(), selection.growth
     fit: Fit = SeparableProblem.solve
     if len(data.names) == 1:

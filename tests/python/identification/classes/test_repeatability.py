@@ -83,6 +83,17 @@ def test_one_recording_has_no_band() -> None:
     assert identify([only, only]).band is None
 
 
+def test_cycles_at_the_same_settings_do_not_show_the_force_between_them() -> None:
+    """The wall begins between the last two settings of a linear stage, which every cycle repeats."""
+    x = np.round(np.linspace(0.0, 9.9, 20), 2)
+    x = np.tile(np.append(x, x[-2::-1]), 2)
+    side = np.tile(np.append(np.ones(20), -np.ones(19)), 2)
+    force = 3.0 + 0.45 * x + (0.5 + 0.05 * x) * side + 120.0 * np.maximum(x - 9.5, 0.0)
+    model = identify(1e-3 * x, force + np.random.default_rng(1).normal(0.0, 0.02, len(x)))
+    assert model.verdict.level == "usable"
+    assert any("left out of the fit" in each.sentence for each in model.verdict.findings)
+
+
 def test_recordings_of_different_strokes_have_no_band() -> None:
     x = np.linspace(0.0, 1.0, 200)
     press = Recording.from_arrays(x, 2.0 * x, direction=np.ones(200))
