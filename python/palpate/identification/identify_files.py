@@ -36,7 +36,7 @@ from ..recording import Source
 from ..recording.checks.wrong_readings import wrong_readings
 from ..recording.conversion import mirror_notes
 from ..recording.files import unchanged
-from ..recording.motion import strokes_from_order
+from ..recording.motion import strokes_from_order, waits
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
 from ..verdict import usable
@@ -212,6 +212,8 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
             require_in_range("force", force)
             direction = block.direction
             side = strokes_from_order(position) if direction is None else direction[~wrong]
+            if direction is None and (waiting := waits(position)) is not None:
+                side = np.where(waiting, 0, side)
             summary = summarise(position, force, side)
             if wrong.any():
                 first = int(np.flatnonzero(block.kept)[wrong][0])
@@ -240,17 +242,19 @@ def require_all_rows(recording: LongRecording, read: PartRead) -> None:
 def _error_on_rows(
     summary: Summary, network: FittedNetwork, side: Float1D | None, period: float | None
 ) -> float:
-    """Returns the RMS error of a network on the rows of a summary; the network is taken as straight within a
-    cell."""
+    """Returns the RMS error of a network on the rows of a summary, with hysteresis on those with a direction;
+    the network is taken as straight within a cell."""
     position, lower = summary.position, float(network.lower[0])
     if period is not None:
         position = lower + period * modulo((position - lower) / period)
     model = network.force_model()
-    given = {} if side is None or network.weight_hysteresis is None else {"direction": side}
+    given, rows = {}, summary.count
+    if side is not None and network.weight_hysteresis is not None:
+        given, rows = {"direction": side}, summary.count * (side != 0.0)
     force, slope = (np.asarray(read(position, **given)) for read in (model.force, model.slope))
     inside = summary.yy - 2.0 * slope * summary.xy + slope**2 * summary.xx
-    total = inside + summary.count * (summary.force - force) ** 2
-    return float(np.sqrt(max(float(total.sum()), 0.0) / summary.rows))
+    total = inside / summary.count + (summary.force - force) ** 2
+    return float(np.sqrt(max(float(np.average(total, weights=rows)), 0.0)))
 
 
 def _identified(

@@ -73,15 +73,6 @@ LEAST_STROKE_ROWS = 4
 JUMPING_SHARE = 0.1
 """If a larger share of the rows is in jumps of position, the rows are not ordered in time [-]."""
 
-HOLD_SHARE = 0.1
-"""Rows at the last position of a stroke are a hold if they exceed this share of its rows [-].
-
-The share of a sinusoidal reversal within the position noise is added.
-"""
-
-HOLD_ROWS = 10
-"""Rows at the last position of a stroke are a hold (direction 0) only if they are at least this many."""
-
 
 def strokes_from_order(position: Float1D) -> Int8Vector | None:
     """Returns the direction of each row from the order of rows.
@@ -97,40 +88,27 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
     Returns
     -------
     (n,) array of int8 or None
-        +1 into the object, -1 out of it, 0 in a hold at the end of a stroke. All rows have one direction if
-        the position never turns back. None if the rows have no order, are too few, or do not
-        move.
+        +1 into the object, -1 out of it, 0 in a jump. All rows have one direction if the position never
+        turns back. None if the rows have no order, are too few, or do not move.
     """
     travel = float(np.ptp(position)) if len(position) > LEAST_STROKE_ROWS else 0.0
     if not 0.0 < travel < np.inf:
         return None
     x = np.asarray((position - position.min()) / travel)
-    noise = noise_of(x)
-    turn = max(TURN_SHARE, TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
+    turn = max(TURN_SHARE, TURN_NOISE * noise_of(x), TURN_STEPS * resolution_of(x))
     if turn > LARGEST_TURN:
         return None
     direction = np.zeros(len(x), dtype=np.int8)
     begin, jumping = 0, 0
-    holds: list[slice] = []
     ends = _stroke_ends(x, turn)
-    for (end, sign), (next_end, _) in pairwise([*ends, (len(x) - 1, 0)]):
-        around = x[begin : next_end + 1]
-        reached = _rest(around, end - begin, 0.0)[0]
-        if reached + 1 < LEAST_STROKE_ROWS:
-            jumping += reached
-            begin += reached
+    for end, sign in ends:
+        if end - begin + 1 < LEAST_STROKE_ROWS:
+            jumping += end - begin
+            begin = end
             continue
-        last = len(x) - 1 if end == ends[-1][0] else begin + reached
+        last = len(x) - 1 if end == ends[-1][0] else end
         direction[begin : last + 1] = sign
-        near = min(TURN_NOISE * noise, 1.0)
-        held, moving = _rest(around, reached, near)
-        # Share of a half-period in which a sinusoidal motion is within `near` of an extreme position.
-        slow_share = 2.0 * np.arccos(1.0 - 2.0 * near) / np.pi
-        if moving - held >= max(HOLD_ROWS, (HOLD_SHARE + slow_share) * reached):
-            holds.append(slice(begin + held, begin + moving + 1))
         begin = last + 1
-    for hold in holds:
-        direction[hold] = 0
     if jumping > JUMPING_SHARE * len(x) or not direction.any():
         return None
     return direction
@@ -234,15 +212,6 @@ def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
         start += int(np.argmax(sign * x[start : stop + 1]))
         exact.append((start, sign))
     return exact
-
-
-def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
-    """Returns first and last row of the run around `row` in which |x - x[row]| is at most `within`."""
-    away = np.abs(x - x[row]) > within
-    before, after = np.flatnonzero(away[:row]), np.flatnonzero(away[row:])
-    first = int(before[-1]) + 1 if len(before) else 0
-    last = row + int(after[0]) - 1 if len(after) else len(x) - 1
-    return first, last
 
 
 SLOW_RATIO = 0.05

@@ -552,6 +552,21 @@ def test_hysteresis_is_tested_without_a_direction_column(tmp_path: Path, suffix:
         assert model.force(x, direction=sides) == pytest.approx(expected.force(x, direction=sides), abs=5e-3)
 
 
+def test_rows_that_wait_are_in_neither_stroke_nor_error(tmp_path: Path) -> None:
+    frame = stroke_rows(2000).drop(columns="direction")
+    turn = int(frame["position_rad"].argmax())
+    hold = pd.concat([frame.iloc[[turn]]] * 1000)
+    hold["torque_Nm"] -= np.linspace(0.0, 0.5, 1000)
+    waiting = pd.concat([frame.iloc[: turn + 1], hold, frame.iloc[turn + 1 :]])
+    model = palpate.identify_files(written(waiting, tmp_path / "hold.csv"))
+    expected = palpate.identify_files(written(frame, tmp_path / "no_hold.csv"))
+    assert model.fit.nrmse < 0.01
+    x = np.linspace(0.05, 0.55, 100)
+    for side in (1.0, -1.0):
+        sides = np.full(100, side)
+        assert model.force(x, direction=sides) == pytest.approx(expected.force(x, direction=sides), abs=5e-3)
+
+
 def test_rows_in_no_order_give_a_finding_that_hysteresis_was_not_tested(tmp_path: Path) -> None:
     frame = stroke_rows(2000).drop(columns="direction").sample(frac=1.0, random_state=1)
     model = palpate.identify_files(written(frame, tmp_path / "press.csv"))

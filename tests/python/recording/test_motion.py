@@ -56,14 +56,14 @@ def test_short_strokes_are_found(rows: int) -> None:
     assert found.tolist() == [1] * rows + [-1] * rows
 
 
-def test_a_hold_at_the_end_of_a_stroke_has_no_direction() -> None:
+def test_the_tool_waits_in_a_hold_at_the_end_of_a_stroke() -> None:
     hold = np.concatenate([np.linspace(0, 1, 100), np.ones(100), np.linspace(1, 0, 100)])
     for position in (hold, hold + noise(0.003, 300)):
-        found = strokes_from_order(position)
+        found = waits(position)
         assert found is not None
-        assert (found[110:190] == 0).all()
-        assert (found[:90] == 1).all()
-        assert (found[210:] == -1).all()
+        assert found[110:190].all()
+        assert not found[10:90].any()
+        assert not found[210:290].any()
 
 
 @pytest.mark.parametrize("strokes", [2, 5])
