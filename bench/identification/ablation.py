@@ -266,6 +266,7 @@ RULES = (
     Rule("largest radius needs turns apart", f"{CLASSES}.hysteresis", "PlaySearch._turns_apart", _one),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),
+    Rule("missing play radius", f"{CLASSES}.findings", "radius_that_follows", _nothing),
     Rule("rows next to turns of a tool that leaves", f"{DATA}.strokes", "NEXT_TO_TURN", 0),
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),

@@ -338,9 +338,9 @@ def identify(
     compared = sum(verification.n for _, verification in verified)
     verdict = model.verdict
     if hold_out_every is not None:
-        error, judged_error = errors_of([found for _, found in verified])
-        nrmse, settled = error.nrmse, judged_error.nrmse
-        rms = f"RMS {verified[0][0].file_unit('force').text(error.rmse)}, "
+        whole, weighted = errors_of([found for _, found in verified])
+        nrmse, settled = whole.nrmse, weighted.nrmse
+        rms = f"RMS {verified[0][0].file_unit('force').text(whole.rmse)}, "
         verdict += Verdict(tuple(error_findings(settled, f"{compared} held-out rows")))
         verdict += Verdict(tuple(chain.from_iterable(circumstances(model, *each) for each in verified)))
     result = {

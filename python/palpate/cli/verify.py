@@ -109,8 +109,8 @@ def verify(
             print_json(
                 {
                     name: getattr(verification, name)
-                    for name in ("nrmse", "settled_nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "within_band", "n",
-                                 "fresh", "extrapolated")
+                    for name in ("nrmse", "settled_nrmse", "rmse", "mse", "r2", "worst", "within_jnd",
+                                 "within_band", "n", "fresh", "extrapolated")
                 }
                 | {"verdict": str(verification.verdict), "units": verification.units}
             )  # fmt: skip

@@ -15,7 +15,7 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..frames import pd
 from ..html_table import Curve, html_table
-from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text
+from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text, reversal_findings
 from ..identification.data.rows import require_in_range
 from ..identification.data.strokes import weights_of_shared_errors
 from ..identification.options import SearchOptions
@@ -294,38 +294,30 @@ def verify(
 def _compared(
     model: Model, recording: Recording, play_radius: float | None = None
 ) -> tuple[Informative, Prediction, Float1D]:
-    """Returns the recording without the rows that an identification drops, the force of the model at its
-    rows, and the weight of each evaluated row in the error.
-
-    Rows behind turns share an error if the direction of the model changes at once there. A play operator
-    states how friction reverses, so that these rows count whole.
-    """
+    """Returns the recording without the rows that an identification drops before its fit, the force of the
+    model at its rows, and the weight of each evaluated row in the error that the verdict uses."""
     informative = Informative([recording], float(model.lower[0]))
-    for last in (False, True):
-        (kept,) = informative.recordings
-        found = predict(model, kept, play_radius=play_radius)
-        at, residual = np.flatnonzero(found.rows), kept.force[found.rows] - found.force
-        shared = _shared_weights(kept, found, residual)
-        between = np.interp(np.arange(len(kept)), at, shared * residual)
-        if last or not informative.drop_wrong_readings([between]):
-            break
+    (kept,) = informative.recordings
+    found = predict(model, kept, play_radius=play_radius)
+    weight = _weights(kept, found)
     rows = np.zeros(len(recording), dtype=bool)
-    rows[informative.kept[0][at]] = True
-    follows = found.side is not None and bool((np.abs(found.side) != 1.0).any())
-    found = replace(found, rows=rows, without_motion=found.without_motion + len(recording) - len(kept))
-    return informative, found, np.ones(len(shared)) if follows else shared
+    rows[informative.kept[0][found.rows]] = True
+    without_motion = found.without_motion + len(recording) - len(kept)
+    return informative, replace(found, rows=rows, without_motion=without_motion), weight
 
 
-def _shared_weights(recording: Recording, found: Prediction, residual: Float1D) -> Float1D:
-    """Returns the weights (k,) of the evaluated rows, with residuals (k,), in an error that rows behind turns
-    share; 1 each without directions."""
-    if found.side is None or (order := ordered_strokes(recording)) is None or not len(residual):
-        return np.ones(len(residual))
-    rows, all_residuals = found.rows, np.zeros(len(recording))
-    all_residuals[rows] = residual
+def _weights(recording: Recording, found: Prediction) -> Float1D:
+    """Returns the weights (k,) of the evaluated rows: rows behind turns share an error if the direction of
+    the model changes at once there. A play operator states how friction reverses: all rows count whole."""
+    rows, order = found.rows, ordered_strokes(recording)
+    if found.side is None or order is None or not (np.abs(found.side) == 1.0).all():
+        return np.ones(len(found.force))
+    residual = np.zeros(len(recording))
+    residual[rows] = recording.force[rows] - found.force
     path = (recording.position - found.position.min()) / (np.ptp(found.position) or 1.0)
-    order, share = np.where(rows, order, 0.0), SearchOptions.contact_share
-    return weights_of_shared_errors(path, order, all_residuals, recording.force, share)[rows]
+    share = SearchOptions.contact_share
+    moved: Float1D = np.where(rows, order, 0).astype(np.float64)
+    return weights_of_shared_errors(path, moved, residual, recording.force, share)[rows]
 
 
 def errors_of(verified: Sequence[Verification]) -> tuple[RowError, RowError]:
@@ -366,14 +358,14 @@ def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Fl
 
 def findings_of(model: Model, found: Verification, kept: Recording) -> tuple[Finding, ...]:
     """Returns all findings of a verification; a defect of the recording, without dropped rows, limits what it
-    shows of a model. The recording of the identification shows what its findings say, unless the error is
-    larger than they state."""
+    shows of a model. The recording of the identification shows what the findings of the model state, unless
+    the error is worse."""
     known = Verdict() if found.fresh else model.verdict
     error = Verdict(tuple(error_findings(found.settled_nrmse, f"{found.n} rows")))
     of_error = (*error.findings, *_of_cause(model, found.recording, found))
     return (
         *known.findings,
-        *(of_error if found.fresh or (error + known != known and error.level != known.level) else ()),
+        *(of_error if found.fresh or (error + known).level != known.level else ()),
         *_of_rows(model, found.recording, found),
         *quality_findings(kept, attracts=model.below == "linear"),
     )
@@ -462,6 +454,16 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
                     f"same, or the force depends on an input that the model does not have, such as {missing}"
                 )
             )
+    side = found.prediction.side
+    if side is not None and (found.weight < 1.0).any():
+        position = recording.position[found.rows]
+        without = found.residual - model.force(position, direction=side)
+        findings += reversal_findings(
+            position,
+            lambda other: without + model.force(position, direction=other),
+            *errors_of([found]),
+            recording.file_unit("position"),
+        )
     return [*findings, *noticed_findings(found.judged_strokes, *found.file_units)]
 
 

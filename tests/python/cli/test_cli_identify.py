@@ -27,6 +27,7 @@ JSON_FIELDS = [
     "model_class",
     "stop_reason",
     "nrmse",
+    "settled_nrmse",
     "verdict",
     "seconds",
     "roles",

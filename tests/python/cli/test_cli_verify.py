@@ -2,6 +2,7 @@
 """palpate verify and palpate show: numbers, figures, and messages about wrong model files."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,18 @@ from palpate import Recording, load_model, read_recording, verify
 from palpate.cli.figures import close_loops, picture_closed_loops, picture_verification
 from palpate.cli.main import main
 
-JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "within_band", "n", "fresh"]
+JSON_FIELDS = [
+    "nrmse",
+    "settled_nrmse",
+    "rmse",
+    "mse",
+    "r2",
+    "worst",
+    "within_jnd",
+    "within_band",
+    "n",
+    "fresh",
+]
 JSON_FIELDS += ["extrapolated", "verdict", "units"]
 UNITS = {"position": "rad", "force": "N*m"}
 
@@ -112,6 +124,26 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert result["fresh"] is True
     assert result["n"] == 2000
     assert result["units"] == UNITS
+
+
+def test_identify_and_verify_print_one_error(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The friction reverses over a tenth of the travel as no play operator does."""
+    time = np.arange(0.0, 8.0, 0.008)
+    x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
+    way = np.where(np.gradient(x) > 0.0, 1.0, -1.0)
+    since = np.where(way > 0.0, x, 1.0 - x)
+    side = way * np.where(time < 1.0, 1.0, 1.0 - 2.0 * np.exp(-((since / 0.08) ** 5)))
+    noise = np.random.default_rng(0).normal(0.0, 0.001, len(x))
+    Recording.from_arrays(x, 0.02 * x + 0.1 * side + noise, time, units=UNITS).write("f.csv")
+    errors = []
+    for command in (["identify", "f.csv", "-o", "f.json"], ["verify", "f.json", "f.csv"]):
+        main(command)
+        printed = " ".join(capsys.readouterr().out.split())
+        found = re.search(r"NRMSE (\S+) on .*?, (\S+) if rows behind turns, where friction", printed)
+        assert found is not None
+        errors.append([float(each) for each in found.groups()])
+    np.testing.assert_allclose(*errors, rtol=1e-3)
+    assert errors[0][0] > 0.1 > errors[0][1]
 
 
 def test_a_verdict_of_no_exits_with_code_1_and_names_the_cure(

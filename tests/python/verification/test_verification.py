@@ -13,8 +13,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from imperfect import press_and_release
-from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
-from palpate._core.model import Memory
+from palpate import (
+    InputError,
+    Model,
+    Recording,
+    SearchOptions,
+    identify,
+    load_model,
+    read_recording,
+    verify,
+)
+from palpate._core.model import Memory, play
 from palpate.model import Fit
 from palpate.plotting import plot
 from palpate.recording import Source, sample_recording
@@ -555,3 +564,87 @@ def test_a_defect_of_the_fresh_recording_is_named() -> None:
     assert verify(model, x, force + noise[1]).verdict.level == "good"
     clipped = verify(model, x, np.minimum(force, 3.0) + np.where(force < 3.0, noise[1], 0.0))
     assert any("the largest force, 3" in each for each in clipped.verdict.reasons)
+
+
+def friction(seed: int, turning: float | None = None) -> Recording:
+    """Returns four strokes of a spring with friction that reverses over a tenth of the travel as no play
+    operator does, or as the play operator of a radius `turning` does, with a noise of 0.001 N*m."""
+    time = np.arange(0.0, 8.0, 0.008)
+    x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
+    way = np.where(np.gradient(x) > 0.0, 1.0, -1.0)
+    since = np.where(way > 0.0, x, 1.0 - x)
+    side = way * np.where(time < 1.0, 1.0, 1.0 - 2.0 * np.exp(-((since / 0.08) ** 5)))
+    if turning is not None:
+        side = (x - play(x, turning)) / turning
+    noise = np.random.default_rng(seed).normal(0.0, 0.001, len(x))
+    return Recording.from_arrays(x, 0.02 * x + 0.1 * side + noise, time, units=RAD)
+
+
+@cache
+def of_friction() -> Model:
+    return identify(friction(0))
+
+
+def test_an_identification_and_a_verification_state_one_error_and_one_verdict() -> None:
+    model, own, fresh = of_friction(), verify(of_friction(), friction(0)), verify(of_friction(), friction(1))
+    assert model.play_radius is None
+    assert own.nrmse == pytest.approx(model.fit.nrmse)
+    assert own.settled_nrmse == pytest.approx(model.notes["settled_nrmse"])
+    assert [*model.verdict.findings, *own.verdict.findings[-1:]] == list(own.verdict.findings)
+    assert "identified on this recording" in str(own.verdict)
+    assert str(model.verdict) == str(fresh.verdict) == "good"
+
+
+def test_the_error_of_rows_behind_turns_is_named() -> None:
+    found = verify(of_friction(), friction(1))
+    assert found.settled_nrmse < 0.02 < 0.1 < found.nrmse
+    statement = found.summary()["error"]
+    assert f"NRMSE {found.nrmse:.4g} on {found.n} rows" in statement
+    assert f"{found.settled_nrmse:.4g} if rows behind turns" in statement
+    assert "just noticeable differences" in found.summary()["felt"]
+    assert "behind turns" not in verify(model_of(stroke().source), curve()).summary()["error"]
+
+
+def test_a_wrong_play_radius_is_not_good() -> None:
+    """A play radius states how friction reverses, so that the rows behind turns count whole."""
+    model = identify(friction(0, turning=0.02))
+    assert model.play_radius == pytest.approx(0.02, rel=0.1)
+    assert str(verify(model, friction(1, turning=0.02)).verdict) == "good"
+    wrong = verify(model, friction(1, turning=0.02), play_radius=0.08)
+    assert wrong.settled_nrmse == wrong.nrmse > 0.1
+    assert wrong.verdict.level == "usable"
+
+
+def test_a_model_that_reverses_at_once_is_not_good_if_a_play_radius_follows_the_rows() -> None:
+    slow = friction(0, turning=0.05)
+    model = identify(slow, search=SearchOptions(play_radius=(0.003,)))
+    assert model.play_radius is None
+    for verdict in (model.verdict, verify(model, friction(1, turning=0.05)).verdict):
+        assert verdict.level == "usable"
+        assert "--search play_radius=0.05" in str(verdict)
+    better = identify(slow, search=SearchOptions(play_radius=(0.05,)))
+    assert str(better.verdict) == str(verify(better, friction(1, turning=0.05)).verdict) == "good"
+
+
+def test_wrong_readings_are_dropped_and_named() -> None:
+    recording, model = friction(1), of_friction()
+    force = recording.force.copy()
+    force[[210, 460, 730]] = 5.0
+    found, clean = verify(model, replace(recording, force=force)), verify(model, recording)
+    assert str(found.verdict) == "good"
+    assert not found.rows[[210, 460, 730]].any()
+    assert found.nrmse == pytest.approx(clean.nrmse, rel=0.01)
+    assert "3 of 1000 rows dropped (wrong readings)" in found.summary()["dropped"]
+    assert len(found.force) == len(found.to_frame()) == found.n == clean.n - 3
+
+
+def test_rows_without_direction_form_no_stroke() -> None:
+    """Two rows between the strokes do not show a share of the travel."""
+    recording = stroke()
+    assert recording.direction is not None
+    direction, force = recording.direction.copy(), recording.force.copy()
+    direction[[399, 400]] = 0
+    force[[399, 400]] += 0.3
+    turned = replace(recording, direction=direction, force=force)
+    found = verify(model_of(curve().source, linear=[2.0]), turned)
+    assert [each.name for each in found.strokes] == ["release", "press"]
