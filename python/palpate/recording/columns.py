@@ -53,8 +53,9 @@ LAWS = (("m", "N"), ("rad", "N*m"))
 """SI units of position and force between which an object has a law. A count or a current can be
 either."""
 
-DIRECTION_NAMES = ("direction", "segment")
-"""Names of columns that are read as the direction of the stroke if the caller names no such column."""
+DIRECTION_NAMES = ("direction", "segment", "richtung", "sens", "stroke")
+"""Names of columns, in lower case, that can state the direction of the stroke in another way than by words
+that palpate knows."""
 
 _NOT_MEASURED = re.compile(
     r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll|filt(ered)?)(_|$)"
@@ -221,7 +222,7 @@ def _attempt(
     if problems or position_column is None or force_column is None:
         return None, problems
     notes += _unit_notes(each for each in chosen.values() if each is not None)
-    direction = request.direction or next((name for name in DIRECTION_NAMES if name in names), None)
+    direction = request.direction or _direction(columns, notes)
     return Choice(
         position=position_column,
         force=force_column,
@@ -230,6 +231,26 @@ def _attempt(
         inputs=tuple(next(column for column in columns if column.name == name) for name in request.inputs),
         notes=tuple(notes),
     ), {}
+
+
+def _direction(columns: Sequence[Column], notes: list[str]) -> str | None:
+    """Returns the column of the direction: one called so, or one whose words state both directions.
+
+    Nothing is known of the cells of a frame: there the name alone decides.
+    """
+    for column in columns:
+        name, look = column.name.lower(), column.look
+        is_known = look is NO_LOOK or bool(look.directions and (look.text or name == "direction"))
+        has_both = {1, -1} <= look.directions and (look.text or name in DIRECTION_NAMES)
+        if has_both or column.name == "direction" or (is_known and name in DIRECTION_NAMES[:2]):
+            return column.name
+    for column in columns:
+        if column.look.text and column.name.lower() in DIRECTION_NAMES:
+            notes.append(
+                f"{column.name} holds {column.look.example!r} and is not read; if it is a direction of the "
+                "stroke, replace its words by press and release"
+            )
+    return None
 
 
 def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str]) -> list[Column]:
@@ -416,7 +437,9 @@ def _cure(
         candidates = [
             each
             for each in columns
-            if each.name not in {*others, *DIRECTION_NAMES} and (not each.look.text or each.unit is CLOCK)
+            if each.name not in others
+            and each.name.lower() not in DIRECTION_NAMES[:2]
+            and (not each.look.text or each.unit is CLOCK)
         ]
         wanted = None if named_column is None else nearest_name(named_column, names)
         suggestion = next((each for each in candidates if each.name in (named_column, wanted)), None)

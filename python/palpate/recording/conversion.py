@@ -260,7 +260,9 @@ class Conversion:
         for name in self.numbers:
             check.finite(name, cells[name])
         directions = (
-            None if self.direction is None else check.directions(self.direction, cells[self.direction])
+            None
+            if self.direction is None
+            else check.directions(self.direction, cells[self.direction], self.si(self.choice.position, cells))
         )
         if self.choice.time is not None:
             check.increasing(self.choice.time.name, cells[self.choice.time.name])
@@ -322,7 +324,8 @@ def converted(
     conversion, cells = conversion.read(table)
     direction_column = conversion.direction
     if (
-        direction_column == "segment"
+        direction_column is not None
+        and direction_column.lower() == "segment"
         and direction is None
         and all(parse_number(word) is not None for word in cells[direction_column])
     ):

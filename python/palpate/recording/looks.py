@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from .._typing import Float1D
 from ..frames import pd
+from .rows import direction_of
 from .table import MISSING, Cells, parse_with
 
 LOOK_ROWS = 1000
@@ -44,6 +45,8 @@ class Look:
     largest: float = np.nan
     turns: int = 0
     """Number of changes from rising to falling or back"""
+    directions: frozenset[int] = frozenset()
+    """Directions of the stroke that the cells state; empty if one of them states none"""
     example: str = ""
     """First cell with text, if there is one"""
 
@@ -76,6 +79,7 @@ class Look:
             least=float(finite.min()) if finite.size else np.nan,
             largest=float(finite.max()) if finite.size else np.nan,
             turns=_turns(finite),
+            directions=_directions(set(words)),
             example=texts[0] if texts else "",
         )
 
@@ -143,6 +147,12 @@ def cure_of_header(rows: Sequence[Sequence[Any]]) -> str:
     assumed = " and ".join(f"column {k + 1} is {roles[k][1]}" for k in sorted(roles))
     names = ",".join(roles.get(k, (f"column_{k + 1}", ""))[0] for k in range(len(looks)))
     return f"The columns are {described}. If {assumed}, add: --columns {names}"
+
+
+def _directions(words: Collection[Any]) -> frozenset[int]:
+    """Returns the directions that all of the words or numbers state; empty if one of them states none."""
+    found = [direction_of(str(word)) for word in words]
+    return frozenset(each for each in found if each is not None) if None not in found else frozenset()
 
 
 def _rises(values: Float1D) -> bool:

@@ -79,9 +79,10 @@ def read_recording(
     time : str, optional
         Column of the time; else chosen by unit.
     direction : str, optional
-        Column of the stroke's direction (press, release). It contains words (press, approach, load, loading,
-        forward, +1; release, retract, unload, unloading, back, -1; pause, hold, extra, 0). By default a
-        column ``direction``, or a column ``segment`` with words, is used.
+        Column of the stroke's direction (press, release). It contains words in small or capital letters
+        (press, approach, load, loading, forward, in, down, +1; release, retract, unload, unloading, back,
+        out, up, -1; pause, hold, extra, 0). By default a column with both kinds of these words, or a column
+        ``direction``, is used.
     inputs : sequence of str
         Further columns that the force depends on.
     units : mapping of str to str, optional
@@ -416,8 +417,6 @@ def open_long_recording(
         negate=negate,
         drop=invalid == "drop",
     )
-    if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
-        conversion = replace(conversion, direction=None)  # segment numbers are not directions
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     has_time = conversion.choice.time is not None
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))

@@ -13,14 +13,26 @@ from .._core.status import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError, shortened
 from ..frames import pd
+from .motion import strokes_from_order
 from .table import Cells, Places
+
+WAYS = {**dict.fromkeys(("down", "ab", "descente"), 1), **dict.fromkeys(("up", "auf", "montée"), -1)}
+"""Direction by the words for a way of the tool. Down is into the object, unless the position rises in the
+rows of the words for up."""
 
 DIRECTION_WORDS: dict[str, int] = {
     **dict.fromkeys(("press", "approach", "load", "loading", "forward", "+1"), 1),
     **dict.fromkeys(("release", "retract", "unload", "unloading", "back", "-1"), -1),
     **dict.fromkeys(("pause", "hold", "extra", "0"), 0),
 }
-"""Direction of the stroke by the word in a file: into the object (+1), out of it (-1), neither (0)."""
+"""Direction of the stroke by the word in a file, in lower case: into the object (+1), out of it (-1), neither
+(0)."""
+
+_MORE_WORDS = WAYS | {
+    **dict.fromkeys(("in", "druck", "belastung", "charge"), 1),
+    **dict.fromkeys(("out", "entlastung", "décharge"), -1),
+}
+"""More words that are read, but that a message does not list"""
 
 
 @dataclass
@@ -102,8 +114,10 @@ class RowCheck:
             bad, name, "holds {cell}, which is not a finite number", "without a finite number in " + name
         )
 
-    def directions(self, name: str, cells: Cells) -> Int8Vector:
-        """Returns the direction that each row states. An unknown word always refuses the file."""
+    def directions(self, name: str, cells: Cells, position: Float1D) -> Int8Vector:
+        """Returns the direction that each row states; `position` (n,) decides if it states a way of the tool.
+        An unknown word always refuses the file.
+        """
         codes, words = pd.factorize(cells)
         values = np.zeros(len(words), dtype=np.int8)
         for index, word in enumerate(words):
@@ -122,7 +136,9 @@ class RowCheck:
                 self._refuse_or_drop(
                     self.kept & rows, name, "has no direction", "without a direction in " + name
                 )
-        return values[codes]
+        found = np.asarray(values[codes])
+        is_way = all(word.strip().casefold() in WAYS for word in words)
+        return -found if is_way and along(position[self.kept], found[self.kept]).sum() < 0.0 else found
 
     def increasing(self, name: str, time: Float1D) -> None:
         """Refuses or drops each row whose time is not later than the times of all usable rows before it."""
@@ -162,14 +178,23 @@ def _rows(count: int) -> str:
     return f"{count} row{'s' * (count > 1)}"
 
 
+def along(position: Float1D, direction: Int8Vector) -> Float1D:
+    """Returns the steps (k,) of the tool between rows of one stated direction, > 0 in this direction and < 0
+    against it; none if the rows are not in the order of a motion."""
+    if strokes_from_order(position) is None:
+        return np.empty(0)
+    steps = np.diff(position) * direction[1:]
+    return np.asarray(steps[(direction[1:] == direction[:-1]) & (steps != 0.0)])
+
+
 def direction_of(word: str) -> int | None:
     """Returns the direction that a cell states, or None for an unknown word.
 
     Numbers count by their value: ``1``, ``+1`` and ``1.0`` are the same direction.
     """
-    text = word.strip()
-    if text in DIRECTION_WORDS:
-        return DIRECTION_WORDS[text]
+    text = word.strip().casefold()
+    if (known := DIRECTION_WORDS.get(text, _MORE_WORDS.get(text))) is not None:
+        return known
     try:
         value = float(text)
     except ValueError:

@@ -8,6 +8,7 @@ import pytest
 
 from palpate import InputError, read_recording
 from palpate.recording import Source
+from palpate.recording.checks import quality_findings
 from small_files import HEADER, Write, refusal, rows, timed_rows
 
 
@@ -75,7 +76,7 @@ def test_blank_lines_are_ignored_and_counted_in_line_numbers(csv_file: Write) ->
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["press", "approach", "load", "loading", "forward", "+1", "1", "1.0", " press "], 1),
+        (["press", "approach", "load", "loading", "forward", "+1", "1", "1.0", " Press "], 1),
         (["release", "retract", "unload", "unloading", "back", "-1", "-1.0"], -1),
         (["pause", "hold", "extra", "0", "0.0"], 0),
     ],
@@ -87,6 +88,44 @@ def test_each_direction_word_gives_its_direction(csv_file: Write, words: list[st
     assert direction is not None
     assert direction.dtype == np.int8
     assert set(direction.tolist()) == {expected}
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Direction", ("Down", "Up")),
+        ("Stroke", ("press", "release")),
+        ("Richtung", ("Druck", "Entlastung")),
+        ("Sens", ("montée", "descente")),
+        ("DIRECTION", ("1", "-1")),
+        ("Weg", ("auf", "ab")),
+    ],
+)
+def test_a_column_of_words_of_direction_is_found_by_its_words(
+    csv_file: Write, name: str, words: tuple[str, str]
+) -> None:
+    """In the words for a way of the tool, the position decides which of them is into the object."""
+    rows = [f"{k},{k},{words[0]}" for k in range(12)] + [f"{12 - k},{k},{words[1]}" for k in range(12)]
+    recording = read_recording(csv_file(f"depth_mm,force_N,{name}", rows))
+    assert recording.direction is not None
+    assert recording.direction.tolist() == [1] * 12 + [-1] * 12
+    assert recording.source.columns["direction"] == name
+
+
+def test_rows_without_the_order_of_a_motion_keep_their_stated_direction(csv_file: Write) -> None:
+    place = np.random.default_rng(0).permutation(60)
+    rows = [f"{k // 2},{k // 2 - k % 2},{('down', 'up')[k % 2]}" for k in place]
+    recording = read_recording(csv_file("depth_mm,force_N,Direction", rows))
+    assert recording.direction is not None
+    assert recording.direction.tolist() == (1 - 2 * (place % 2)).tolist()
+    assert not quality_findings(recording)
+
+
+def test_an_unread_column_of_directions_is_named(csv_file: Write) -> None:
+    rows = [f"{k},{k},{('vor', 'zurueck')[k > 5]}" for k in range(12)]
+    recording = read_recording(csv_file("depth_mm,force_N,Richtung", rows))
+    assert recording.direction is None
+    assert any("Richtung holds 'vor' and is not read" in note for note in recording.notes)
 
 
 def test_a_segment_column_of_words_is_the_direction(csv_file: Write) -> None:

@@ -98,7 +98,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
             "press, approach, load, loading, forward, +1, release, retract, unload, unloading, back, -1, "
             "pause, hold, extra, 0",
         )
-        for word in ("upward", " Press ", "2", "0.5")
+        for word in ("upward", "2", "0.5")
         for invalid in ("refuse", "drop")
     },
     "rows beyond the end": (

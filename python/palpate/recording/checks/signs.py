@@ -12,6 +12,7 @@ from ...verdict import FORCE_FLOOR, Finding, no, usable
 from ..contact import air_rows
 from ..conversion import mirror_notes
 from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S
+from ..rows import along
 from .cells import Checked, inner_range
 
 if TYPE_CHECKING:
@@ -28,10 +29,10 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
     """
     recording = checked.recording
     signs = recording.direction
-    if signs is not None and len(signs) > 1:
-        step = np.diff(recording.position) * signs[1:]
-        if step.sum() < 0:
-            against = float(np.mean(step[step != 0.0] < 0))
+    if signs is not None:
+        steps = along(recording.position, signs)
+        if steps.sum() < 0.0:
+            against = float(np.mean(steps < 0.0))
             return [
                 usable(
                     f"the position falls in rows whose direction is into the object ({against:.0%} of the "
