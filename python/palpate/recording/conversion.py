@@ -416,6 +416,7 @@ def converted(
         ),
         "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),
         "file_units": file_units,
+        "unit_is_certain": bool({"position", choice.position.name} & set(options.get("units") or ())),
         "unread_time": choice.unread_time,
         "part_of": _motion(conversion, all_cells, start + np.flatnonzero(check.kept)) if is_part else None,
     }

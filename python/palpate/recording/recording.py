@@ -63,6 +63,8 @@ class Recording:
     """All rows of the motion of which the recording is a part; None if the recording contains all rows"""
     file_units: Mapping[str, Unit] = field(default_factory=dict, repr=False)
     """Units of "position" and "force" in the file, for messages; a missing one is taken from `units`"""
+    unit_is_certain: bool = False
+    """True if the caller states the unit of the position"""
     unread_time: str = ""
     """Sentence on a column of times that was not read; empty if there is none"""
     corrected_lag_s: float = 0.0

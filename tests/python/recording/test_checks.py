@@ -124,6 +124,20 @@ def test_an_implausible_travel_is_reported_as_a_wrong_unit(name: str, factor: fl
     assert any("the unit of position or force is probably wrong" in sentence for sentence in found)
 
 
+@pytest.mark.parametrize(
+    ("name", "units", "factor"),
+    [("pull_mm", {}, 1.5), ("pull_cm", {}, 0.1), ("pull_m", {"pull_m": "m"}, 0.001)],
+)
+def test_a_stated_unit_of_a_long_travel_is_not_doubted(
+    csv_file: Callable[..., Path], name: str, units: dict[str, str], factor: float
+) -> None:
+    path = csv_file(f"{name},force_N", [f"{factor * k},{5 + k % 7}" for k in range(1000)])
+    assert not any("unit" in each.sentence for each in quality_findings(read_recording(path, units=units)))
+    if units:
+        (finding,) = (each for each in quality_findings(read_recording(path)) if "the unit" in each.sentence)
+        assert finding.sentence.endswith("for example --units pull_m=m if it is m")
+
+
 def test_the_ranges_of_a_microscope_recording_are_plausible() -> None:
     x = np.linspace(0.0, 3e-6, 500)
     assert sentences(Rows(x, 0.01 * x, None, None, {"position": "m", "force": "N"})) == []

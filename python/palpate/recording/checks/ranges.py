@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...errors import command_word
 from ...verdict import Finding, usable
 from .cells import Checked
 
@@ -17,8 +18,10 @@ Bounds = tuple[float, float]
 def implausible_range(
     checked: Checked, *, travels: Mapping[str, Bounds], microscope_travel: float, microscope_force: float
 ) -> list[Finding]:
-    """Returns findings on an implausible travel, and on a large force over a tiny travel. Unstated units are
-    not checked.
+    """Returns findings on an implausible travel, and on a large force over a tiny travel.
+
+    Only an SI unit in the name of a column is checked: a program may have written it above values in other
+    units. A unit that the caller states is certain.
 
     Parameters
     ----------
@@ -30,7 +33,10 @@ def implausible_range(
         Largest plausible range of its force [N].
     """
     recording, travel = checked.recording, checked.travel
+    column = recording.source.columns.get("position", "position")
     position, force = recording.file_unit("position"), recording.file_unit("force")
+    if position.factor != 1.0 or recording.unit_is_certain:
+        return []
     low, high = travels.get(position.si, (0.0, math.inf))
     of_force = float(np.ptp(recording.force))
     if 0.0 < travel < low or travel > high:
@@ -49,6 +55,7 @@ def implausible_range(
         return []
     return [
         usable(
-            f"the {seen}: the unit of position or force is probably wrong; name the right one with --units"
+            f"the {seen}: the unit of position or force is probably wrong; state the right one, for example "
+            f"--units {command_word(f'{column}={position.symbol}')} if it is {position.symbol}"
         )
     ]
