@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Likely causes of a large error: a unit, a sign or an offset between a model and a recording."""
+"""Likely causes of an error: a unit, a sign, an offset or a delay between a model and a recording."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..identification.classes.findings import USABLE_NRMSE
 from ..model import Model
 from ..recording import Recording
 from ..recording.units import UNITS, Unit
@@ -28,10 +30,10 @@ FACTOR_TOLERANCE = 0.02
 reported [-]."""
 
 OFFSETS_PER_GRID = 41
-"""Number of position offsets on one grid that are tried as the cause of a large error."""
+"""Number of position offsets, or of delays, on one grid that are tried as the cause of an error."""
 
 OFFSET_GRIDS = 3
-"""Number of grids of position offsets, each finer than the previous one."""
+"""Number of grids, each finer than the previous one."""
 
 MOST_ROWS = 2000
 """Largest number of rows on which possible causes of an error are compared: enough to distinguish them."""
@@ -39,7 +41,7 @@ MOST_ROWS = 2000
 
 @dataclass(frozen=True)
 class Explanation:
-    """Change of a recording after which the model may fit the recording."""
+    """Change of a recording after which the model fits the recording."""
 
     nrmse: float
     sentence: str
@@ -48,17 +50,19 @@ class Explanation:
 
 
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
-    """Returns the simplest change of the recording that more than halves the error, or None.
+    """Returns the simplest change of the recording with which the model fits it, or None.
 
-    The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
-    of the force, another unit of force or position, an offset of the position, and a factor of the force.
-    None for a model with memory.
+    The model fits if the change more than halves the error and the verdict accepts the rest. The changes are:
+    the sign of the force, press and release exchanged, the sign of the position or of both, an offset of the
+    force, another unit of force or position, an offset of the position, a late force, and a factor of the
+    force. None for a model with memory.
     """
     if model.memory is not None:  # a changed position also changes the forces at later times
         return None
     index = np.flatnonzero(prediction.rows)
     few = slice(None, None, max(1, -(-len(index) // MOST_ROWS)))
-    force, modelled = recording.force[index][few], prediction.force[few]
+    index = index[few]
+    force, modelled = recording.force[index], prediction.force[few]
     if float(np.std(force)) == 0.0:
         return None
     nrmse = _share(modelled - force, force)
@@ -66,8 +70,9 @@ def explanation(model: Model, recording: Recording, prediction: Prediction) -> E
     tried = [*_of_force(force, modelled, unit)]
     if model.dimension == 1 and model.mass is None and model.damping is None:
         side = None if prediction.side is None else prediction.side[few]
-        tried += _of_position(model, prediction.position[few], side, force, recording)
-    found = [each for each in tried if each.nrmse < REPORTED_NRMSE_RATIO * nrmse]
+        tried += _of_position(model, prediction.position[few], side, index, recording)
+    largest = min(USABLE_NRMSE, REPORTED_NRMSE_RATIO * nrmse)
+    found = [each for each in tried if each.nrmse < largest]
     least = min((each.nrmse for each in found), default=0.0)
     return min(
         (each for each in found if each.nrmse <= EQUIVALENT_NRMSE_RATIO * least),
@@ -102,31 +107,39 @@ def _of_force(force: Float1D, modelled: Float1D, unit: Unit) -> Iterator[Explana
     yield Explanation(
         _share(modelled - factor * force, modelled),
         f"the model fits if the recorded force is multiplied by {factor:.4g}: {cause}",
-        order=3 if known else 6,
+        order=3 if known else 7,
     )
 
 
 def _of_position(
-    model: Model, position: Float1D, side: Float1D | None, force: Float1D, recording: Recording
+    model: Model, position: Float1D, side: Float1D | None, index: NDArray[np.intp], recording: Recording
 ) -> Iterator[Explanation]:
-    """Yields changes of the recorded direction (press and release exchanged) and position (opposite sign,
-    unit, offset)."""
+    """Yields changes of the recorded direction (press and release exchanged), position (opposite sign, unit,
+    offset) and time of the force, for the rows `index`."""
+    force = recording.force[index]
 
-    def left(at: Float1D, s: Float1D | None) -> float:
+    def left(at: Float1D, s: Float1D | None = side, of: Float1D = force) -> float:
         modelled = model.force(at) if s is None else model.force(at, direction=s)
-        error = _share(modelled - force, force)
+        error = _share(modelled - of, of)
         return error if np.isfinite(error) else np.inf
 
     unit = recording.units["position"] or model.units["position"]
+    turned = None if side is None else -side
     if side is not None:
         yield Explanation(
-            left(position, -side),
+            left(position, turned),
             "the model fits with press and release exchanged: check the words of the direction column",
             order=0,
         )
     yield Explanation(
-        left(-position, None if side is None else -side),
+        left(-position, turned),
         "the model fits with the opposite sign of the recorded position: give --negate position",
+        order=1,
+    )
+    yield Explanation(
+        left(-position, turned, -force),
+        "the model fits with the opposite signs of the recorded position and force: give --negate position "
+        "--negate force",
         order=1,
     )
     for symbol, other in UNITS.items():
@@ -136,24 +149,44 @@ def _of_position(
                 (1.0 / other.factor, f"it may be in {unit}, not in {symbol}"),
             ):
                 yield Explanation(
-                    left(factor * position, side),
+                    left(factor * position),
                     f"the model fits if the recorded position is multiplied by {factor:.4g}: {cause}. Give "
                     "its unit with --units",
                     order=4,
                 )
-    # Search the position offset on a grid over the travel, then on finer grids around the best offset.
-    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (OFFSETS_PER_GRID - 1)
-    for _ in range(OFFSET_GRIDS):
-        grid = best + step * (np.arange(OFFSETS_PER_GRID) - OFFSETS_PER_GRID // 2)
-        best = float(min(grid, key=lambda shift: left(position + shift, side)))
-        step *= 4.0 / (OFFSETS_PER_GRID - 1)
+    travel = float(model.upper[0] - model.lower[0])
+    offset, error = _least(lambda offset: left(position + offset), 2.0 * travel / (OFFSETS_PER_GRID - 1))
     yield Explanation(
-        left(position + best, side),
-        f"the model fits if {recording.file_unit('position').text(abs(best))} is "
-        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: the zero of the "
+        error,
+        f"the model fits if {recording.file_unit('position').text(abs(offset))} is "
+        f"{'added to' if offset > 0.0 else 'subtracted from'} the recorded position: the zero of the "
         "position may have moved. Correct the positions in the file",
         order=5,
     )
+    if recording.time is not None:
+        time, moved = recording.time, recording.position
+
+        def late(delay: float) -> float:
+            earlier = np.interp(time[index] - delay, time, moved) - moved[index]
+            return left(position + earlier) if delay >= 0.0 else np.inf
+
+        delay, error = _least(late, float(np.median(np.diff(time))))
+        yield Explanation(
+            error,
+            f"the model fits if the recorded force is {delay:.3g} s late: give --force-late-s {delay:.3g}",
+            order=6,
+        )
+
+
+def _least(error: Callable[[float], float], step: float) -> tuple[float, float]:
+    """Returns the change with the least error, and this error: from a grid about zero with this step, then
+    from finer grids about the best change."""
+    best = 0.0
+    for _ in range(OFFSET_GRIDS):
+        grid = best + step * (np.arange(OFFSETS_PER_GRID) - OFFSETS_PER_GRID // 2)
+        best = float(min(grid, key=error))
+        step *= 4.0 / (OFFSETS_PER_GRID - 1)
+    return best, error(best)
 
 
 def _unit_of(factor: float, unit: str) -> str | None:

@@ -362,12 +362,13 @@ def findings_of(model: Model, found: Verification, kept: Recording) -> tuple[Fin
     the error is worse."""
     known = Verdict() if found.fresh else model.verdict
     error = Verdict(tuple(error_findings(found.settled_nrmse, f"{found.n} rows")))
-    of_error = (*error.findings, *_of_cause(model, found.recording, found))
+    defects = quality_findings(kept, attracts=model.below == "linear")
+    of_error = (*error.findings, *_of_cause(model, found.recording, found, defects))
     return (
         *known.findings,
         *(of_error if found.fresh or (error + known).level != known.level else ()),
         *_of_rows(model, found.recording, found),
-        *quality_findings(kept, attracts=model.below == "linear"),
+        *defects,
     )
 
 
@@ -423,9 +424,13 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
     return findings
 
 
-def _of_cause(model: Model, recording: Recording, found: Verification) -> list[Finding]:
-    """Returns findings on the error: perceptible by a hand, and the likely cause of a large one."""
+def _of_cause(
+    model: Model, recording: Recording, found: Verification, defects: Sequence[Finding] = ()
+) -> list[Finding]:
+    """Returns findings on the error: perceptible by a hand, and its likely cause, unless the recording has
+    `defects`, which may be the cause."""
     findings = []
+    noticed = noticed_findings(found.judged_strokes, *found.file_units)
     if found.within_band is not None and found.within_band < LEAST_SHARE_IN_BAND:
         of = "objects" if model.band is not None and model.band.objects > 1 else "recordings"
         findings.append(
@@ -435,7 +440,11 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
                 "position or device. Few repeats of one object differ this much"
             )
         )
-    if found.settled_nrmse > USABLE_NRMSE:
+    large = found.settled_nrmse > USABLE_NRMSE
+    cause = explanation(model, recording, found.prediction) if large or noticed else None
+    if cause is not None:
+        findings.append(usable(f"{cause.sentence} (NRMSE {cause.nrmse:.3g})"))
+    elif large and not defects and found.whiteness > STRUCTURED_CORRELATION:
         known = {
             "velocity": model.of_velocity,
             "hysteresis": model.hysteretic,
@@ -443,17 +452,13 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
         }
         missing = ", ".join(name for name, has in known.items() if not has)
         missing = f"{missing} or another column" if missing else "another column"
-        cause = explanation(model, recording, found.prediction)
-        if cause is not None:
-            findings.append(usable(f"{cause.sentence} (NRMSE {cause.nrmse:.3g})"))
-        elif found.whiteness > STRUCTURED_CORRELATION:
-            findings.append(
-                usable(
-                    f"the errors of neighbouring rows are correlated ({found.whiteness:.2g}, above "
-                    f"{STRUCTURED_CORRELATION:g}): the object is not the same, its zero position is not the "
-                    f"same, or the force depends on an input that the model does not have, such as {missing}"
-                )
+        findings.append(
+            usable(
+                f"the errors of neighbouring rows are correlated ({found.whiteness:.2g}, above "
+                f"{STRUCTURED_CORRELATION:g}): the object is not the same, its zero position is not the "
+                f"same, or the force depends on an input that the model does not have, such as {missing}"
             )
+        )
     side = found.prediction.side
     if side is not None and (found.weight < 1.0).any():
         position = recording.position[found.rows]
@@ -464,7 +469,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
             *errors_of([found]),
             recording.file_unit("position"),
         )
-    return [*findings, *noticed_findings(found.judged_strokes, *found.file_units)]
+    return [*findings, *noticed]
 
 
 def _domain(model: Model, recording: Recording) -> str:

@@ -195,6 +195,12 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
     assert verify(model, held).worst < 1e-12
 
 
+def curved() -> Model:
+    """Returns a model whose force is curved: an offset of the position is no offset of the force."""
+    wavelet = {"alpha": [[4.0]], "beta": [[0.3]], "weight": [2.0], "linear": [0.5]}
+    return model_of(stroke().source, **wavelet, fit=Fit("position", "bic", 0.1, 1, 5))
+
+
 @pytest.mark.parametrize(
     ("changed", "sentence"),
     [
@@ -214,31 +220,58 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
             {"position": lambda x, f: -x},
             "with the opposite sign of the recorded position: give --negate position",
         ),
+        (
+            {"position": lambda x, f: -x, "force": lambda x, f: -f},
+            "with the opposite signs of the recorded position and force: give --negate position --negate f",
+        ),
     ],
-    ids=["unit", "gain", "force-sign", "offset", "degrees", "zero", "position-sign"],
+    ids=["unit", "gain", "force-sign", "offset", "degrees", "zero", "position-sign", "both-signs"],
 )
 def test_large_error_reports_the_change_that_makes_the_model_fit(
     changed: dict[str, Any], sentence: str
 ) -> None:
-    """The force is curved, so an offset of the position changes the error otherwise than one of the force."""
-    model = model_of(
-        stroke().source,
-        alpha=[[4.0]],
-        beta=[[0.3]],
-        weight=[2.0],
-        linear=[0.5],
-        fit=Fit("position", "bic", 0.1, 1, 5),
-    )
+    model = curved()
     x = np.random.default_rng(1).uniform(0.0, 1.0, 500)
     force = model.force(x) + np.random.default_rng(2).normal(0.0, NOISE, 500)
     given = {"position": x, "force": force}
-    role = next(iter(changed))
-    given[role] = changed[role](x, force)
+    given |= {role: change(x, force) for role, change in changed.items()}
     verdict = verify(model, Recording.from_arrays(**given, units=RAD)).verdict
     assert verdict.level == "no"
     causes = [reason for reason in verdict.reasons if reason.startswith("the model fits ")]
     assert len(causes) == 1
     assert re.search(sentence, causes[0])
+
+
+SWEPT_TIME = np.arange(3000) * 1e-3
+"""[s]"""
+
+SWEPT = 0.5 - 0.4 * np.cos(2 * np.pi * 1.7 * SWEPT_TIME) * np.cos(2 * np.pi * 0.3 * SWEPT_TIME)
+"""Positions of a motion by hand [rad]"""
+
+
+@pytest.mark.parametrize(
+    ("shifted", "delay", "sentence"),
+    [
+        (0.01, 0.0, r"0\.01 rad is subtracted from the recorded pos"),
+        (0.0, 0.02, r"0\.02 s late: give --force-l"),
+    ],
+)
+def test_a_cause_is_named_for_an_error_that_a_hand_notices(shifted: float, delay: float, sentence: str) -> None:
+    model = curved()
+    force = model.force(np.interp(SWEPT_TIME - delay, SWEPT_TIME, SWEPT))
+    found = verify(model, Recording.from_arrays(SWEPT + shifted, force, SWEPT_TIME, units=RAD))
+    assert found.verdict.level == "usable"
+    assert re.search(f"the model fits if .*{sentence}", str(found.verdict))
+
+
+def test_a_change_that_only_reduces_the_error_is_not_one_with_which_the_model_fits() -> None:
+    """The force is clipped: an offset of the force halves the error."""
+    model = model_of(stroke().source, linear=[40.0])
+    force = np.minimum(model.force(SWEPT), 8.0)
+    verdict = str(verify(model, Recording.from_arrays(SWEPT, force, SWEPT_TIME, units=RAD)).verdict)
+    assert "clipped" in verdict
+    assert "the model fits" not in verdict
+    assert "neighbouring" not in verdict
 
 
 def test_exchanged_press_and_release_are_reported() -> None:
