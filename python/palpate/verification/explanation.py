@@ -52,10 +52,9 @@ class Explanation:
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
     """Returns the simplest change of the recording with which the model fits it, or None.
 
-    The model fits if the change more than halves the error and the verdict accepts the rest. The changes are:
-    the sign of the force, press and release exchanged, the sign of the position or of both, an offset of the
-    force, another unit of force or position, an offset of the position, a late force, and a factor of the
-    force. None for a model with memory.
+    The model fits if the change more than halves the error and the verdict accepts the rest. Changes of the
+    force are another sign, unit, offset, factor or delay. Changes of the position are another sign, also with
+    that of the force, another unit, an offset, and press and release exchanged. A model with memory has none.
     """
     if model.memory is not None:  # a changed position also changes the forces at later times
         return None

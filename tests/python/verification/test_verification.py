@@ -196,7 +196,7 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
 
 
 def curved() -> Model:
-    """Returns a model whose force is curved: an offset of the position is no offset of the force."""
+    """Returns a model whose force is curved: an offset of the position differs from one of the force."""
     wavelet = {"alpha": [[4.0]], "beta": [[0.3]], "weight": [2.0], "linear": [0.5]}
     return model_of(stroke().source, **wavelet, fit=Fit("position", "bic", 0.1, 1, 5))
 
@@ -256,7 +256,7 @@ SWEPT = 0.5 - 0.4 * np.cos(2 * np.pi * 1.7 * SWEPT_TIME) * np.cos(2 * np.pi * 0.
         (0.0, 0.02, r"0\.02 s late: give --force-l"),
     ],
 )
-def test_a_cause_is_named_for_an_error_that_a_hand_notices(shifted: float, delay: float, sentence: str) -> None:
+def test_a_cause_is_named_for_an_error_that_is_noticed(shifted: float, delay: float, sentence: str) -> None:
     model = curved()
     force = model.force(np.interp(SWEPT_TIME - delay, SWEPT_TIME, SWEPT))
     found = verify(model, Recording.from_arrays(SWEPT + shifted, force, SWEPT_TIME, units=RAD))
