@@ -58,10 +58,11 @@ DIRECTION_NAMES = ("direction", "segment", "richtung", "sens", "stroke")
 that palpate knows."""
 
 _NOT_MEASURED = re.compile(
-    r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll|filt(ered)?)(_|$)"
+    r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll|filt(ered)?|peak|max|mean|avg)"
+    r"(_|$)"
 )
-"""Words of a column that holds what a controller requires, or a filtered and therefore late copy, not what
-was measured."""
+"""Words of a column that holds what a controller requires, or a value of several rows, such as a filtered and
+therefore late copy or the largest one so far, not what was measured."""
 
 _EPOCH_S = (946_684_800.0, 4_102_444_800.0)
 """Seconds from 1970 to 2000 and to 2100. Times since 1970 between both have only one plausible unit."""
@@ -279,7 +280,16 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
         if name.endswith("_in") and name not in stated and f"{parts.stem}_out" in names:
             parts, unit = replace(parts, stem=name), None  # the ending "_in" means input, not inches
         columns.append(Column(name, parts.stem, unit, parts.stated, look))
-    return columns
+    if any(each.unit is not None and each.unit.si in FORCE_UNITS for each in columns):
+        return columns
+    return [replace(each, unit=each.unit or _weight(each)) for each in columns]
+
+
+def _weight(column: Column) -> Unit | None:
+    """Returns the unit of the weight if a column shows the mass on a scale: it is in the place of a unit, and
+    no other column has a unit of force; else None."""
+    unit = unit_of(column.stated) if column.named is None else None
+    return unit if unit is not None and unit.si == "N" else None
 
 
 def _epoch_unit(stem: str, look: Look) -> Unit | None:
@@ -328,7 +338,7 @@ def _unit_notes(columns: Iterable[Column]) -> list[str]:
     notes = []
     for column in columns:
         named, read = parse_name(column.name).unit, column.unit
-        if read is None or column.stem == column.name:
+        if read is None or (named is None and not column.stated):
             continue
         if named is not None and named != read:
             notes.append(f"{column.name} is read in {read.symbol}, although its name states {named.symbol}")
@@ -456,8 +466,9 @@ def _cure(
             chosen += [UNITS[each].si for each in units.values()]
             unit = _likely_unit(role, suggestion, chosen, with_unit.values())
             units[suggestion.name] = unit
-            shown = UNIT_TO_FILL_IN if suggestion.stated else unit
-            fill_in = fill_in or bool(suggestion.stated)
+            is_unknown = bool(suggestion.stated) and not _states_unit_of(role, suggestion)
+            shown = UNIT_TO_FILL_IN if is_unknown else unit
+            fill_in = fill_in or is_unknown
             added.append(f"--units {command_word(f'{suggestion.name}={shown}')}")
             if not suggestion.stated:
                 assumed.append(f"{shortened(suggestion.name)} is in {unit}")
@@ -483,6 +494,9 @@ def _likely_unit(role: Role, column: Column, *known: Collection[str]) -> str:
     """
     named, travel = column.named, column.look.largest - column.look.least
     possible = [si for si in role.si_units if named is None or si in named] or list(role.si_units)
+    for text in (column.stated, re.split(r"[_\s]", column.name)[-1]):
+        if (unit := unit_of(text)) is not None and unit.si in possible and unit.symbol.startswith(text):
+            return unit.symbol
     likely = next(
         (si for units in known for si in possible if any({si, other} in map(set, LAWS) for other in units)),
         possible[0],
@@ -511,6 +525,12 @@ def _time_options(column: Column) -> list[str]:
     return [f"--time {command_word(column.name)}", f"--units {command_word(f'{column.name}={unit}')}"]
 
 
+def _states_unit_of(role: Role, column: Column) -> bool:
+    """Returns True if the text in the place of a unit is one of the role."""
+    unit = unit_of(column.stated)
+    return unit is not None and unit.si in role.si_units
+
+
 def _suggested(role: Role, columns: Sequence[Column]) -> Column | None:
     """Returns the column that an error message suggests: one with a unit of the role, else the likeliest.
 
@@ -529,7 +549,11 @@ def _suggested(role: Role, columns: Sequence[Column]) -> Column | None:
     fitting = [
         column
         for column in columns
-        if (column.unit.si in role.si_units if column.unit is not None else unit_of(column.stated) is None)
+        if (
+            column.unit.si in role.si_units
+            if column.unit is not None
+            else unit_of(column.stated) is None or _states_unit_of(role, column)
+        )
         and (column.named is None or column.named & set(role.si_units))
     ]
     return min(fitting, key=rank, default=None)

@@ -17,7 +17,7 @@ from typing import Any
 from ..errors import InputError, escaped, listed, shortened
 from .looks import cure_of_header
 from .table import MISSING, parse_number, parse_with
-from .units import split_name, unit_of
+from .units import JAPANESE_QUANTITIES, split_name, unit_of
 
 HEAD_BYTES = 1 << 20
 """Number of first bytes of a file in which the header is searched; a later header is not found."""
@@ -140,7 +140,7 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
         lines_before = spans[last][1] + 1
     notes = []
     if encoding != "utf-8":
-        notes.append({"latin-1": "Latin-1"}.get(encoding, encoding.upper()))
+        notes.append({"latin-1": "Latin-1", "cp932": "Shift JIS"}.get(encoding, encoding.upper()))
     if separator != ",":
         notes.append(f"separated by {SEPARATORS[separator]}s")
     if marks.startswith(","):
@@ -223,8 +223,9 @@ def _text_of(file: str, head: bytes, whole: bool) -> tuple[int, str, str]:
     mark, encoding = _encoding(head)
     text = _decoded(file, head[mark:], encoding, whole)
     if encoding == "utf-8" and text is None:
-        encoding = "latin-1"
-        text = _decoded(file, head[mark:], encoding, whole)
+        encoding, text = "cp932", _decoded(file, head[mark:], "cp932", whole)
+        if text is None or not any(word in text for word in JAPANESE_QUANTITIES):
+            encoding, text = "latin-1", _decoded(file, head[mark:], "latin-1", whole)
     if text is None or _is_binary(text):
         raise not_text(file)
     return mark, encoding, text

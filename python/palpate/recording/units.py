@@ -157,6 +157,9 @@ _QUANTITIES: dict[tuple[str, ...], str] = {
 }
 """Parts of column names by the SI units of the quantity that they name."""
 
+JAPANESE_QUANTITIES = ("変位", "荷重", "試験力", "時間")
+"""Names of quantities by which a text in Shift JIS is recognised."""
+
 _WHOLE_NAMES = {
     **dict.fromkeys(("x", "z"), ("m", "rad", "count")),
     **dict.fromkeys(("f", "fx", "fy", "fz", "fn"), ("N", "N*m")),
@@ -306,8 +309,10 @@ def _place_of_unit(column: str) -> tuple[str, str, str]:
         return stem.strip(), symbol, ","
     if "/" in column:
         stem, _, symbol = column.rpartition("/")
-        # `mm/s` and `velocity m/s` are quotients of units, `F/A` may be a quotient of quantities.
-        quotient = "/" in stem or len(stem.strip()) < 2 or unit_of(re.split(r"[\s_]", stem.strip())[-1])
+        # `mm/s` and `velocity m/s` are quotients of units, `F/A` is one of quantities, `F/N` is none.
+        unit, named = unit_of(symbol), quantity_of(stem)
+        is_short = len(stem.strip()) < 2 and not (unit and named and unit.si in named)
+        quotient = "/" in stem or is_short or unit_of(re.split(r"[\s_]", stem.strip())[-1])
         return ("", "", "/") if quotient else (stem.strip(), symbol, "/")
     if preposition := _PREPOSITION.fullmatch(column):
         return preposition["stem"], preposition["symbol"], "in"

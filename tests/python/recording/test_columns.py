@@ -119,6 +119,29 @@ def test_a_refusal_names_all_problems_and_one_command(header: str, sentence: str
         choose(header)
 
 
+@pytest.mark.parametrize(
+    "name", ["Scale [g]", "Gewicht in g", "Waage (g)", "Poids (g)", "tension (kg)", "Netto (g)", "m, g"]
+)
+def test_a_mass_on_a_scale_is_the_force_that_is_its_weight(name: str) -> None:
+    choice = choose_columns("press.csv", ["Weg (mm)", name])
+    unit = UNITS["kgf" if "kg" in name else "gf"]
+    assert (choice.force.name, choice.force.unit) == (name, unit)
+    assert choice.notes == (f"{name} is read in {unit.symbol}",)
+
+
+def test_a_mass_of_another_quantity_or_next_to_a_force_is_no_force() -> None:
+    assert choose("x_mm,Vibration [g],Kraft (N)").force.name == "Kraft (N)"
+    with pytest.raises(InputError, match="needs two columns of numbers"):
+        choose("x_mm,Acceleration [g]")
+
+
+def test_a_cure_states_the_unit_in_a_name() -> None:
+    with pytest.raises(InputError, match=r"If hx711_g is in gf, add: --force hx711_g --units hx711_g=gf$"):
+        choose("x_mm,hx711_g")
+    with pytest.raises(InputError, match=r"add: --units 'Scale \[g\]=gf'$"):
+        choose("x_mm,force_N,Scale [g]", force="Scale [g]")
+
+
 def test_a_cure_suggests_the_likely_columns() -> None:
     def cure(header: str, **named: object) -> str:
         with pytest.raises(InputError) as refused:
@@ -141,6 +164,7 @@ def test_a_cure_suggests_the_likely_columns() -> None:
     assert cure("cmd_mm,actual_mm,force_N") == "--position actual_mm"
     assert cure("PedalPosTarget_mm,PedalPosAct_mm,force_N") == "--position PedalPosAct_mm"
     assert cure("depth_mm,Force_filt [N],Force_raw [N]") == "--force 'Force_raw [N]'"
+    assert cure("depth_mm,Peak Load (N),Load (N)") == "--force 'Load (N)'"
 
 
 @pytest.mark.parametrize(

@@ -91,6 +91,16 @@ def test_a_file_of_another_program_is_read_and_its_dialect_reported(
     assert read_recording(recording.write(tmp_path / "again.csv")).metadata == metadata
 
 
+def test_a_header_in_shift_jis_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "press.csv"
+    text = "変位(mm),荷重(g)\n" + "".join(f"{0.5 * k},{10 * k}\n" for k in range(12))
+    path.write_bytes(text.encode("cp932"))
+    recording = read_recording(path)
+    assert read_as(recording) == "Shift JIS"
+    assert recording.source.columns == {"position": "変位(mm)", "force": "荷重(g)"}
+    np.testing.assert_allclose(recording.force, 9.80665e-2 * np.arange(12), rtol=1e-12)
+
+
 @pytest.mark.parametrize("row", [3, 100_000], ids=["at the start", "far below"])
 def test_a_byte_outside_utf_8_is_read_as_latin_1_or_refused_with_a_command(tmp_path: Path, row: int) -> None:
     lines = [f"{0.5 * k},{10 * k},ok".encode() for k in range(row + 20)]

@@ -131,6 +131,8 @@ def test_units_are_listed_by_quantity() -> None:
         ("Force (mN)", "Force", "mN"),
         ("Load(N)", "Load", "N"),
         ("Force / N", "Force", "N"),
+        ("F / N", "F", "N"),
+        ("x/mm", "x", "mm"),
         ("Kraft/kN", "Kraft", "kN"),
         ("force, N", "force", "N"),
         ("Tip position [µm]", "Tip position", "um"),
