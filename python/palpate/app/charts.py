@@ -15,7 +15,7 @@ from ..model.model_display import force_curves
 from ..planning import Plan
 from ..plotting.look import Scale, scale_for, strokes
 from ..recording import Recording
-from ..recording.motion import ordered_strokes
+from ..recording.motion import directions_of
 from ..recording.roles import ROLE_NAMES, Role, roles_of
 from ..recording.units import Unit
 from ..report.charts import MOST_DOTS, Chart, Panel
@@ -68,16 +68,11 @@ def recorded(recording: Recording) -> Chart:
     x, y = axes.x.factor * recording.position, axes.y.factor * recording.force
     waiting = role != Role.MOVING
     panel.dots(x[waiting], y[waiting], "soft-dots", "not fitted")
-    for name, rows in strokes(direction_of(recording), len(recording)):
+    for name, rows in strokes(directions_of(recording), len(recording)):
         shown = rows & ~waiting
         panel.dots(x[shown], y[shown], DOTS[name], name or "recorded")
     panel.select()
     return Chart("Recorded force over position.", panel)
-
-
-def direction_of(recording: Recording) -> NDArray[np.int8] | None:
-    """Returns the direction of the rows (n,), recorded or from their order; None if it is not known."""
-    return ordered_strokes(recording) if recording.direction is None else recording.direction
 
 
 def course_axis(recording: Recording) -> tuple[str, Float1D]:
@@ -135,7 +130,7 @@ def modelled(compared: Compared) -> Chart:
     axes = Axes.of(compared.recording)
     x, y = axes.x.factor * compared.position, axes.y.factor * compared.force
     noticed = differences(compared)
-    direction = direction_of(compared.recording)
+    direction = directions_of(compared.recording)
     kept = None if direction is None else direction[compared.found.rows]
     groups = list(strokes(kept, len(x)))
     above = axes.panel(320)

@@ -18,7 +18,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.conversion import MIN_ROWS
-from ..recording.motion import GAP_RATIO, LARGEST_STEP_DEVIATION, ordered_strokes
+from ..recording.motion import GAP_RATIO, LARGEST_STEP_DEVIATION, directions_of
 from ..recording.units import Unit
 
 MOST_SAMPLES = 2**20
@@ -100,7 +100,7 @@ def _history(recording: Recording) -> History:
         raise InputError(f"the recording has {len(recording)} rows; its transforms need at least {MIN_ROWS}")
     if recording.time is not None:
         return _over_time(recording.time, recording.force)
-    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    direction = directions_of(recording)
     rows = None if direction is None else _longest_press(recording.position, direction > 0)
     missing = "the recording has no time, so no frequency is known in Hz; spectrum and transforms are over "
     if rows is None:

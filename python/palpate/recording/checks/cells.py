@@ -16,9 +16,6 @@ from ..._typing import Float1D
 if TYPE_CHECKING:
     from ..recording import Recording
 
-MOST_COMPARED_ROWS = 100_000
-"""Largest number of rows used to compare forces; of a longer recording every k-th moving row is used."""
-
 MOST_CELLS = 64
 """Largest number of equal intervals (cells) into which the positions of a recording are divided."""
 
@@ -94,7 +91,6 @@ def cell_rows(recording: Recording) -> CellRows | None:
     lower, travel = float(recording.position.min()), float(np.ptp(recording.position))
     side = sides(recording)
     row = np.flatnonzero(side)
-    row = row[:: max(1, -(-len(row) // MOST_COMPARED_ROWS))]
     if not travel > 0.0 or len(row) < 8 * LEAST_ROWS_PER_CELL:
         return None
     cells = min(len(row) // (2 * LEAST_ROWS_PER_CELL), MOST_CELLS)
