@@ -19,7 +19,7 @@ from ..model import Model
 from ..recording import Source
 from .classes.model_selection import select
 from .data.compression import held_out_rows
-from .data.limits import ForceScale, distinct_rows
+from .data.limits import ForceScale, distinct_rows, evenly_spread
 from .data.rows import LARGEST_MAGNITUDE, Rows
 from .log import Log
 from .network.fitted import FittedNetwork
@@ -51,10 +51,6 @@ taken as constant."""
 MISSED_SHARE = 0.01
 """Probability that the true range of one of several inputs ends outside the domain, at each end [-]. For m
 rows the distance of the extreme row from this end has the distribution exp(-m distance)."""
-
-MOST_ERROR_ROWS = 200_000
-"""Largest number of rows, evenly spread, from which the reported RMS error is computed. More rows change at
-most the third digit of the error."""
 
 
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -245,7 +241,7 @@ def fit_regression(
     with one_thread():
         selection = select(rows, options)
         best = selection.best
-        some = slice(None, None, max(1, -(-len(y) // MOST_ERROR_ROWS)))
+        some = evenly_spread(np.arange(len(y)))
         error = RowError(y[some] - best.force_at(some), y[some], weight[some])
     margin = _margin(rows.box) * (upper - lower)
     log = Log(selection.log.path)
