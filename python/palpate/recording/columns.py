@@ -237,16 +237,16 @@ def _attempt(
 def _direction(columns: Sequence[Column], notes: list[str]) -> str | None:
     """Returns the column of the direction: one called so, or one whose words state both directions.
 
-    Nothing is known of the cells of a frame: there the name alone decides.
+    Where nothing is known of the cells, as in a frame, the name alone decides.
     """
     for column in columns:
         name, look = column.name.lower(), column.look
-        is_known = look is NO_LOOK or bool(look.directions and (look.text or name == "direction"))
         has_both = {1, -1} <= look.directions and (look.text or name in DIRECTION_NAMES)
-        if has_both or column.name == "direction" or (is_known and name in DIRECTION_NAMES[:2]):
+        may_hold = not look.seen or (look.directions and (look.text or name == "direction"))
+        if has_both or column.name == "direction" or (may_hold and name in DIRECTION_NAMES[:2]):
             return column.name
     for column in columns:
-        if column.look.text and column.name.lower() in DIRECTION_NAMES:
+        if column.look.example and column.name.lower() in DIRECTION_NAMES:
             notes.append(
                 f"{column.name} holds {column.look.example!r} and is not read; if it is a direction of the "
                 "stroke, replace its words by press and release"

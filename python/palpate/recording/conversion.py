@@ -414,7 +414,7 @@ def converted(
             columns=names,
             file_rows=total,
         ),
-        "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),
+        "notes": (conversion.note(torque_constant, table.notes), *notes),
         "file_units": file_units,
         "unit_is_certain": bool({"position", choice.position.name} & set(options.get("units") or ())),
         "unread_time": choice.unread_time,
@@ -456,34 +456,15 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
     return digest.hexdigest()
 
 
-def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
-    """Returns a note if the force falls with position, or if the position falls in rows of a press."""
-    signs = []
-    if correlation < FALLING_CORRELATION:
-        signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
-    if position_falls:
-        signs.append("the position falls in rows whose direction is into the object")
-    if not signs:
+def mirror_notes(correlation: float) -> list[str]:
+    """Returns a note if the force falls with position. The sign is not changed."""
+    if correlation >= FALLING_CORRELATION:
         return []
-    attracts = ", if the object attracts the tool identify it with --below linear"
     return [
-        f"{' and '.join(signs)}: if the position grows out of the object give --negate position, "
-        f"if the force is positive when pulling give --negate force{'' if position_falls else attracts}"
+        f"the force falls with position over the whole file (correlation {correlation:.2f}): if the position "
+        "grows out of the object give --negate position, if the force is positive when pulling give "
+        "--negate force, if the object attracts the tool identify it with --below linear"
     ]
-
-
-def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[str]:
-    """Returns a note if the sign of force or position is probably reversed. The sign is not changed."""
-    x, f = _scaled(x), _scaled(f)
-    correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
-    position_falls = directions is not None and len(x) > 1 and float((np.diff(x) * directions[1:]).sum()) < 0
-    return mirror_notes(correlation, position_falls)
-
-
-def _scaled(values: Float1D) -> Float1D:
-    """Returns the values divided exactly by a power of two, so that their squares cannot overflow."""
-    _, exponent = np.frexp(np.abs(values).max(initial=0.0))
-    return np.asarray(np.ldexp(values, -exponent))
 
 
 def _motion(conversion: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:

@@ -50,6 +50,11 @@ class Look:
     example: str = ""
     """First cell with text, if there is one"""
 
+    @property
+    def seen(self) -> bool:
+        """True if cells were read"""
+        return bool(self.example) or bool(np.isfinite(self.least))
+
     @staticmethod
     def of(cells: Sequence[Any], marks: str) -> Look:
         """Describes the first cells of a column, which are numbers or texts.

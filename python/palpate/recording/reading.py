@@ -417,6 +417,9 @@ def open_long_recording(
         negate=negate,
         drop=invalid == "drop",
     )
+    found = conversion.direction if direction is None else None
+    if found is not None and found.lower() == "segment" and found not in table.text_names:
+        conversion = replace(conversion, direction=None)  # segment numbers are not directions
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     has_time = conversion.choice.time is not None
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))

@@ -204,6 +204,24 @@ def test_a_stroke_that_ends_early_is_reported() -> None:
     )
 
 
+def test_a_force_that_lets_go_does_not_fall_over_the_whole_file() -> None:
+    """The force of a suction cup rises over 9 mm of 14 mm; the tool then returns in one step."""
+    x = np.tile(np.linspace(0.0, 14.0, 400), 3)
+    force = np.where(x < 9.0, 30.0 * np.tanh(x / 6.0) + 0.8 * x, 0.0)
+    force += np.random.default_rng(0).normal(0.0, 0.05, len(x))
+    assert float(np.corrcoef(x, force)[0, 1]) < -0.3
+    recording = palpate.Recording.from_arrays(1e-3 * x, force)
+    assert not [each for each in quality_findings(recording) if "falls with position" in each.sentence]
+
+
+def test_a_jump_back_does_not_decide_how_far_the_force_falls() -> None:
+    x = np.tile(np.linspace(0.1, 4.0, 500), 3)
+    force = 38.0 / (1.0 + x) ** 2
+    correlation = float(np.corrcoef(x, force)[0, 1])
+    (finding,) = quality_findings(palpate.Recording.from_arrays(1e-3 * x, force))
+    assert f"over the whole file (correlation {correlation:.2f})" in finding.sentence
+
+
 def test_waits_do_not_decide_whether_the_force_falls_with_position() -> None:
     random = np.random.default_rng(0)
     press = np.linspace(0.0, 4.0, 400)

@@ -167,7 +167,7 @@ def test_signs_are_reversed_only_with_negate(csv_file: Write) -> None:
     path = csv_file("depth_mm,force_N", [f"{-k},{k}" for k in range(12)])
     recording = read_recording(path)
     assert recording.position[11] == pytest.approx(-0.011)
-    assert [note for note in recording.notes if "--negate" in note] == [
+    assert [each.sentence for each in quality_findings(recording)] == [
         "the force falls with position over the whole file (correlation -1.00): "
         "if the position grows out of the object give --negate position, "
         "if the force is positive when pulling give --negate force, "
@@ -177,13 +177,14 @@ def test_signs_are_reversed_only_with_negate(csv_file: Write) -> None:
         negated = read_recording(path, negate=(name,))
         assert negated.position[11] == pytest.approx(0.011)
         assert negated.force[11] == 11
-        assert not [note for note in negated.notes if "--negate" in note]
+        assert not quality_findings(negated)
     assert read_recording(path, negate=("force",)).force[11] == -11
 
 
 def test_a_direction_opposite_to_the_motion_is_reported(csv_file: Write) -> None:
     path = csv_file(HEADER, [f"{-k},{k % 3},press" for k in range(12)])
-    assert "the position falls in rows whose direction is into the object" in read_recording(path).notes[-1]
+    (finding,) = quality_findings(read_recording(path))
+    assert finding.sentence.startswith("the position falls in rows whose direction is into the object (100%")
 
 
 def test_rows_selects_a_half_open_range(csv_file: Write) -> None:

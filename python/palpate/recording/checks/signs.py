@@ -13,7 +13,7 @@ from ..contact import air_rows
 from ..conversion import mirror_notes
 from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S
 from ..rows import along
-from .cells import Checked, inner_range
+from .cells import LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -60,9 +60,17 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
         ]
     if is_loop or checked.attracts or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
-    # Each row counts by the way of the tool there, so that neither a wait nor the rate of the rows decides.
-    (xx, xf), (_, ff) = np.cov(x, f, aweights=np.abs(np.gradient(x)))
-    correlation = float(xf / np.sqrt(xx * ff)) if xx * ff > 0.0 else 0.0
+    # Equal parts of the travel count the same, so that neither a wait nor the rate of the rows decides.
+    parts = min(max(len(x) // LEAST_ROWS_PER_CELL, 3), MOST_CELLS)
+    part = np.minimum((parts * ((x - checked.lower) / checked.travel)).astype(np.intp), parts - 1)
+    rows = np.bincount(part, minlength=parts)
+    mean = np.bincount(part, (f - f.min()) / np.ptp(f), parts)[rows > 0] / rows[rows > 0]
+    changes = np.diff(mean)
+    felt = np.abs(changes) > FORCE_FLOOR
+    # A force that lets go falls once, and rises over most of the travel.
+    if not np.ptp(mean) > 0.0 or np.sign(changes[felt]).sum() >= 0.0:
+        return []
+    correlation = float(np.corrcoef(np.flatnonzero(rows), mean)[0, 1])
     return [usable(sentence) for sentence in mirror_notes(correlation)]
 
 
