@@ -188,7 +188,7 @@ class _Numbers:
     def branches(self, memory: ExportedMemory) -> Iterator[str]:
         """Yields the numbers of the branches. Their coordinate has a unit in which the ratio is a force."""
         yield _define("BRANCHES", len(memory.stiffness), "springs in series with a dashpot and a slider")
-        yield _define("CONTACT", int(memory.contact), "1: the branches do not pull the tool")
+        yield _define("CONTACT", memory.contact, "sign of a force that the branches do not reverse; 0: none")
         yield _define("MOST_FORCE", _double(self.model.force_limit), f"[{self.exported.force_unit}]")
         yield "/* Stiffness, share of a stretch left after a tick at rest, largest stretch of each branch. */"
         values_of: dict[str, Sequence[float]] = {

@@ -471,11 +471,13 @@ NAME_INLINE double NAME_within(double value, double largest) {
 }
 
 /* Moves the branches by one tick to a position, and returns the force there and its slope. If the force would exceed
-   the force limit, or would pull a tool that can leave the object, all stretches are reduced by one factor. */
+   the force limit, or would pull a tool that can leave the object, all stretches are reduced by one factor, which is
+   0 while the tool is away. */
 NAME_INLINE NAME_real NAME_relaxed(NAME_state *s, double position, NAME_rest at, NAME_real *slope) {
     const double rest = NAME_within((double)at.force, NAME_MOST_FORCE);
-    const double least = !NAME_CONTACT ? -NAME_MOST_FORCE : rest < 0.0 ? rest : 0.0;
-    double coordinate, moved, stretch, unlimited, force, factor, sum, stiffness = 0.0;
+    const double least = NAME_CONTACT <= 0 ? -NAME_MOST_FORCE : rest < 0.0 ? rest : 0.0;
+    const double most = NAME_CONTACT >= 0 ? NAME_MOST_FORCE : rest > 0.0 ? rest : 0.0;
+    double coordinate, moved, stretch, unlimited, force, sum, stiffness = 0.0, factor = 1.0;
     int j;
     NAME_integrals(position, 1, &coordinate, &sum);
     moved = coordinate - s->coordinate;
@@ -490,15 +492,18 @@ NAME_INLINE NAME_real NAME_relaxed(NAME_state *s, double position, NAME_rest at,
         }
     }
     unlimited = rest + (double)at.ratio * sum;
-    force = unlimited > NAME_MOST_FORCE ? NAME_MOST_FORCE : unlimited < least ? least : unlimited;
-    if (!(force < unlimited || force > unlimited)) {
+    force = unlimited > most ? most : unlimited < least ? least : unlimited;
+    if (force < unlimited || force > unlimited) {
+        *slope = NAME_ZERO;
+        factor = (force - rest) / (unlimited - rest);
+        factor = factor < 0.0 ? 0.0 : factor > 1.0 ? 1.0 : factor;
+    } else {
         *slope = (NAME_real)((double)at.slope + (double)at.ratio_slope * sum +
                              (double)at.ratio * (double)at.ratio * stiffness);
-        return (NAME_real)force;
     }
-    *slope = NAME_ZERO;
-    factor = (force - rest) / (unlimited - rest);
-    factor = factor < 0.0 ? 0.0 : factor > 1.0 ? 1.0 : factor;
+    if (NAME_CONTACT != 0 && !(at.ratio < NAME_ZERO || at.ratio > NAME_ZERO)) {
+        factor = 0.0; /* the tool is away from the object */
+    }
     for (j = 0; j < NAME_BRANCHES; ++j) {
         s->stretch[j] *= factor;
     }

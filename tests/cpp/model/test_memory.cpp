@@ -182,6 +182,48 @@ TEST(Memory, NeverPullsAToolThatCanLeave) {
     }
 }
 
+TEST(Memory, MirroredObjectHasTheMirroredForce) {
+    Random random{32};
+    const Domain mirror{{-1.0}, {0.0}, Continuation::Linear, Continuation::Free, std::nullopt};
+    for (int k = 0; k < cases(20); ++k) {
+        MemoryParameters memory = one_branch(uniform(random, 1.0, 10.0), uniform(random, 0.1, 1.0));
+        memory.ratio = {.linear = {0.5}, .bias = 1.0};
+        const ForceModel model =
+            ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain(Continuation::Free)}.with_memory(memory);
+        memory.ratio.linear = {-0.5};
+        const ForceModel mirrored = ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, mirror}.with_memory(memory);
+        const auto object = force_of(model, 1e-3);
+        const auto image = force_of(mirrored, 1e-3);
+        auto state = object.start(0.0);
+        auto other = image.start(0.0);
+        for (int move = 0; move < 20; ++move) {
+            const double x = uniform(random, -0.2, 1.0);
+            const auto sample = object.move_for(x, 0.1, state);
+            const auto opposite = image.move_for(-x, 0.1, other);
+            EXPECT_NEAR(opposite.sample.force, -sample.sample.force, 1e-12);
+            EXPECT_NEAR(opposite.factor, sample.factor, 1e-12);
+        }
+    }
+}
+
+// A tool that leaves faster than the ratio ends between two rows leaves the same object behind as a slow one.
+TEST(Memory, ToolThatIsAwayReleasesTheBranchesAtAnyRate) {
+    MemoryParameters memory = one_branch(4.0, std::numeric_limits<double>::infinity());
+    memory.yield_stretch = {0.5};
+    const ForceModel model =
+        ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain(Continuation::Free)}.with_memory(memory);
+    const auto object = force_of(model, 1e-3);
+    for (const int rows : {1, 10, 1000}) {
+        auto state = object.start(0.0);
+        for (const auto& [from, to] : {std::array{0.0, 0.9}, {0.9, -0.3}, {-0.3, 0.2}}) {
+            for (int row = 1; row <= rows; ++row) {
+                object.advance(from + (to - from) * row / rows, state);
+            }
+        }
+        EXPECT_NEAR(object.at(0.2, state).force, 0.2 + 4.0 * (0.2 + 0.01), 1e-3) << rows;
+    }
+}
+
 TEST(Memory, KeepsTheForceLimitWithItsState) {
     const ForceModel model = standard_linear_solid(1.0, 10.0, 1e3);
     const auto object = force_of(model, 1e-3, 2.0);
@@ -311,11 +353,13 @@ TEST(Memory, LargestStretchIsTheRangeOfTheCoordinate) {
     EXPECT_NEAR(with_ratio(-0.5, 1.2, two_long()).memory()->largest_stretch(0), 1.4, 1e-9);
     const ForceModel free = with_ratio(0.25, 0.5, two_long(Continuation::Free, Continuation::Free));
     EXPECT_NEAR(free.memory()->largest_energy(), 0.5 * 3.0 * 2.51 * 2.51, 1e-8);
-    // A sudden motion through all positions reaches the bound.
+    // A sudden motion through all positions reaches the bound before the tool is away, above 5.
     const auto object = force_of(free, 1e-3);
     auto state = object.start(-9.0);
+    object.advance(4.9999, state);
+    EXPECT_NEAR(state.stretch[0], 2.51, 1e-8);
     object.advance(9.0, state);
-    EXPECT_NEAR(state.stretch[0], 2.51, 1e-9);
+    EXPECT_EQ(state.stretch[0], 0.0);
 }
 
 TEST(Memory, BoundsOfTheRatioAreTight) {
@@ -490,8 +534,9 @@ TEST(Memory, LimitedForceReducesAllStretchesByOneFactor) {
             EXPECT_NEAR(states[0].stretch[j], recorded.factor * e, 1e-12);
         }
         const double rest = std::clamp(g.value, -limit, limit);
-        const double least = model.memory()->contact() ? std::min(rest, 0.0) : -limit;
-        const double expected = std::clamp(rest + p.value * branches, least, limit);
+        const double least = model.memory()->contact() > 0 ? std::min(rest, 0.0) : -limit;
+        const double most = model.memory()->contact() < 0 ? std::max(rest, 0.0) : limit;
+        const double expected = std::clamp(rest + p.value * branches, least, most);
         EXPECT_NEAR(recorded.sample.force, expected, 1e-12) << k;
         EXPECT_NEAR(recorded.sample.force, rest + p.value * reduced, 1e-12) << k;
         EXPECT_NEAR(recorded.sample.energy, g.integral + stored, 1e-12) << k;

@@ -123,6 +123,37 @@ def test_exported_steps_are_the_rendered_forces() -> None:
     assert rendered[200] > 1.5 * rendered[1999]
 
 
+def left_and_pressed_again(rows: int) -> np.ndarray:
+    """Returns the positions of a press to 0.8 m, a release to -0.2 m and a press to 0.3 m, with this number
+    of rows each."""
+    ends = [(0.0, 0.8), (0.8, -0.2), (-0.2, 0.3)]
+    return np.r_[0.0, np.concatenate([np.linspace(a, b, rows + 1)[1:] for a, b in ends])]
+
+
+def test_a_tool_that_leaves_between_two_rows_releases_the_branches_like_a_slow_one() -> None:
+    model = slipping_by_hand(
+        stiffness=[3.0, 2.0], time_constant_s=[np.inf, np.inf], yield_stretch=[0.3, 0.9], below="free"
+    )
+    for rows in (1, 10, 1000):
+        x = left_and_pressed_again(rows)
+        force, factor = model.force_over_time(np.arange(float(len(x))), x)
+        assert force[-1] == pytest.approx(2.0 * 0.3 + 2.0 * 0.31 + 3.0 * 0.3, abs=1e-3), rows
+        assert factor[x == -0.2] == 0.0
+
+
+@pytest.mark.parametrize("into", [1.0, -1.0])
+def test_an_exported_memory_releases_its_branches_and_is_mirrored(into: float) -> None:
+    ends = {"below": "free"} if into > 0.0 else {"above": "free", "lower": [-1.0], "upper": [0.0]}
+    model, direct, step = relaxing_by_hand(**ends), Scheme(structure="direct"), 1e-4
+    tables = ExportedModel(model, direct, encoder_step=step, period_s=1e-3)
+    assert tables.check().passed
+    counts = np.round(into * left_and_pressed_again(40) / step).astype(np.int32)
+    rendered = motion_driven(model, direct, counts * step, 1e-3)["force"]
+    np.testing.assert_allclose(tables.steps(counts), rendered, atol=10.0 * tables.step_error)
+    assert (into * rendered).min() >= 0.0, "a tool that can leave is not pulled"
+    assert into * rendered[-1] == pytest.approx(0.3 * 2.0 + 0.3 * 3.0, rel=0.1)
+
+
 def test_verify_uses_the_time_of_the_recording() -> None:
     found = palpate.verify(relaxing_by_hand(), POSITION, relaxation(TIME), time=TIME)
     assert found.nrmse < 1e-9
@@ -153,11 +184,11 @@ def test_wrong_memory_is_refused_with_its_field() -> None:
         relaxing_by_hand(memory=wrong)
 
 
-def slipping_by_hand(**changes: list[float]) -> palpate.Model:
+def slipping_by_hand(below: str = "linear", **changes: list[float]) -> palpate.Model:
     """Returns the spring with a branch that slips from a stretch of 0.1 m on, and one that relaxes."""
     branches = {"stiffness": [3.0, 1.0], "time_constant_s": [np.inf, 0.5], "yield_stretch": [0.1, np.inf]}
     ratio = {"alpha": [], "beta": [], "weight": [], "linear": 0.0, "bias": 1.0}
-    return relaxing_by_hand(memory=Memory(**ratio, **branches | changes))
+    return relaxing_by_hand(memory=Memory(**ratio, **branches | changes), below=below)
 
 
 def test_a_branch_that_slips_comes_back_from_its_file(tmp_path: Path) -> None:

@@ -79,8 +79,10 @@ class MemoryNetwork {
     /// continuation p decreases to zero over the distance over which g does.
     MemoryNetwork(MemoryParameters parameters, const NetworkCurve& force, const Domain& domain)
         : parameters_{(validate(parameters, domain), std::move(parameters))},
-          ratio_{parameters_.ratio, domain},
-          contact_{domain.below == Continuation::Free || domain.above == Continuation::Free} {
+          ratio_{parameters_.ratio, domain} {
+        if (domain.below == Continuation::Free || domain.above == Continuation::Free) {
+            contact_ = force.above().at_edge.integral >= force.below().at_edge.integral ? 1 : -1;
+        }
         const double travel = domain.upper[0] - domain.lower[0];
         const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
                               Continuation continuation) {
@@ -104,8 +106,9 @@ class MemoryNetwork {
     [[nodiscard]] const MemoryParameters& parameters() const noexcept { return parameters_; }
     /// Returns the ratio p over all positions; its antiderivative is the coordinate u.
     [[nodiscard]] const NetworkCurve& ratio() const noexcept { return ratio_; }
-    /// Returns true if the tool can leave the object. The memory then never pulls the tool.
-    [[nodiscard]] bool contact() const noexcept { return contact_; }
+    /// Returns the sign of the mean force at rest if the tool can leave the object, else 0. The memory then never pulls
+    /// the tool against this sign, and no branch is stretched while the tool is away.
+    [[nodiscard]] int contact() const noexcept { return contact_; }
     /// Return bounds of |p| and |dp/dx| over all positions.
     [[nodiscard]] double largest_ratio() const noexcept { return largest_ratio_; }
     [[nodiscard]] double steepest_ratio() const noexcept { return steepest_ratio_; }
@@ -138,7 +141,7 @@ class MemoryNetwork {
   private:
     MemoryParameters parameters_;
     NetworkCurve ratio_;
-    bool contact_;
+    int contact_ = 0;
     double largest_ratio_ = 0.0;
     double steepest_ratio_ = 0.0;
     double largest_stretch_ = 0.0;
@@ -161,7 +164,8 @@ struct BranchStep {
 ///
 /// The branches use the backward Euler method, e_j <- (e_j + du) / (1 + T / tau_j), limited to Y_j, without iteration. If the
 /// force would exceed the force limit, or would pull a tool that can leave the object, all stretches are multiplied by
-/// one factor from 0 to 1, so that the force is at this limit. The stored energy then only decreases.
+/// one factor from 0 to 1, so that the force is at this limit. Where the ratio has ended and the tool is away, the factor
+/// is 0: a fast tool passes the end of the ratio between two periods. The stored energy then only decreases.
 template <class C>
 class MemoryForce {
   public:
@@ -248,21 +252,23 @@ class MemoryForce {
     Recorded relaxed(double x, const Curve& p, const Sum& sum, State& state) const noexcept {
         const Curve g = force_.at(x);
         const double rest = std::clamp(g.value, -force_limit_, force_limit_);
-        const double least = contact_ ? std::min(rest, 0.0) : -force_limit_;
+        const double least = contact_ > 0 ? std::min(rest, 0.0) : -force_limit_;
+        const double most = contact_ < 0 ? std::max(rest, 0.0) : force_limit_;
         const double unlimited = rest + p.value * sum.force;
         Recorded result{{unlimited, g.slope + p.slope * sum.force + p.value * p.value * sum.stiffness,
                          g.integral, force_.extrapolated(x)},
                         1.0};
-        const double limit = std::clamp(unlimited, least, force_limit_);
+        const double limit = std::clamp(unlimited, least, most);
         if (limit != unlimited) {
             result.factor = std::clamp((limit - rest) / (unlimited - rest), 0.0, 1.0);
             result.sample.force = limit;
             result.sample.slope = 0.0;
-            for (std::size_t j = 0; j < branches_; ++j) {
-                state.stretch[j] *= result.factor;
-            }
+        }
+        if (contact_ != 0 && p.value == 0.0) {
+            result.factor = 0.0;
         }
         for (std::size_t j = 0; j < branches_; ++j) {
+            state.stretch[j] *= result.factor;
             result.sample.energy += 0.5 * stiffness_[j] * state.stretch[j] * state.stretch[j];
         }
         return result;
@@ -275,7 +281,7 @@ class MemoryForce {
     std::array<double, most_branches>
         kept_{};  ///< share of a stretch that is left after a period at rest [-]
     std::size_t branches_;
-    bool contact_;
+    int contact_;
     double force_limit_;
     std::array<double, most_branches> largest_stretch_{};
 };

@@ -184,19 +184,25 @@ class ExportedForce {
         }
         const double ratio = static_cast<double>(p.force);
         const double rest = std::clamp(static_cast<double>(g.force), -limit, limit);
-        const double least = memory.contact ? std::min(rest, 0.0) : -limit;
+        const double least = memory.contact > 0 ? std::min(rest, 0.0) : -limit;
+        const double most = memory.contact < 0 ? std::max(rest, 0.0) : limit;
         const double unlimited = rest + ratio * sum;
-        const double force = std::clamp(unlimited, least, limit);
+        const double force = std::clamp(unlimited, least, most);
+        double slope = 0.0;
+        double factor = 1.0;
         if (force == unlimited) {
-            const double slope =
+            slope =
                 static_cast<double>(g.slope) + static_cast<double>(p.slope) * sum + ratio * ratio * stiffness;
-            return {static_cast<Real>(force), static_cast<Real>(slope)};
+        } else {
+            factor = std::clamp((force - rest) / (unlimited - rest), 0.0, 1.0);
         }
-        const double factor = std::clamp((force - rest) / (unlimited - rest), 0.0, 1.0);
+        if (memory.contact != 0 && ratio == 0.0) {
+            factor = 0.0;
+        }
         for (std::size_t j = 0; j < memory.stiffness.size(); ++j) {
             state.stretch[j] *= factor;
         }
-        return {static_cast<Real>(force), Real{0}};
+        return {static_cast<Real>(force), static_cast<Real>(slope)};
     }
 
     /// Returns the direction state s after a motion to a count, without its limits -1 and 1.
