@@ -25,10 +25,10 @@ ROWS_KEY = "rows_at_steepest_slope"
 
 @dataclass(frozen=True)
 class SteepestSlope:
-    """Largest rising slope of a force over position, inside the domain."""
+    """Largest rising slope of a force over position, inside the domain, or its steepest fall."""
 
     slope: float
-    """[N/m or N*m/rad]"""
+    """[N/m or N*m/rad], < 0 for a fall"""
     position: float
     """[m or rad]"""
     stroke: str
@@ -38,9 +38,9 @@ class SteepestSlope:
     """Ends of the steep part about `position`, where the slope is above half the steepest [m or rad]"""
 
     @classmethod
-    def of(cls, model: ForceModel) -> SteepestSlope | None:
+    def of(cls, model: ForceModel, *, falling: bool = False) -> SteepestSlope | None:
         """Returns the steepest slope of a model; None if the force depends on more than position and
-        direction, or does not rise."""
+        direction, or does not rise, or fall."""
         if model.dimension > 1 or not model.of_position:
             return None
         x = np.linspace(float(model.lower[0]), float(model.upper[0]), _POSITIONS)
@@ -48,14 +48,15 @@ class SteepestSlope:
         slopes = np.array(
             [model.slope(x, direction=None if side is None else np.full(len(x), side)) for side in sides]
         )
-        stroke, at = np.unravel_index(np.argmax(slopes), slopes.shape)
-        along = slopes[stroke]
+        sign = -1.0 if falling else 1.0
+        stroke, at = np.unravel_index(np.argmax(sign * slopes), slopes.shape)
+        along = sign * slopes[stroke]
         if not along[at] > 0.0:
             return None
         ends = np.flatnonzero(along < 0.5 * along[at])
         before, after = ends[ends < at], ends[ends > at]
         return cls(
-            float(along[at]),
+            float(sign * along[at]),
             float(x[at]),
             ("press", "release")[stroke] if model.hysteretic else "",
             float(x[before[-1]] if len(before) else x[0]),

@@ -24,7 +24,7 @@ from ..model import Model
 from ..model.steepest_slope import SteepestSlope
 from .candidates import CANDIDATES, Candidate, Refusal, Task, on_admittance_display
 from .device_profile import find_profile, mechanical_units, require_unit
-from .limited_network import renderable_slopes, sliding_bounds
+from .limited_network import renderable_slopes, sliding_bounds, sliding_slopes
 from .plan import (
     ACCEPTED_FORCE_ERROR,
     SAMPLES,
@@ -418,13 +418,15 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     device, model = task.device, task.model
     _, _, force = mechanical_units(device.position_unit)
     position = device.position_unit
-    steepest, rendered = sliding_bounds(model).steepest, renderable_slopes(device)[1]
+    low, high = sliding_slopes(model)
+    falling = -low > high
+    steepest, rendered = low if falling else high, renderable_slopes(device)[0 if falling else 1]
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     force_at_x = strokes(model, x)
-    place = SteepestSlope.of(model)
+    place = SteepestSlope.of(model, falling=falling)
     slope_unit = f"{force}/{position}"
     sentences = [
-        f"is too steep for this device: its slope is up to {_plain(steepest)} {slope_unit}"
+        f"is too steep for this device: its slope is {'down' if falling else 'up'} to {_plain(steepest)} {slope_unit}"
         f"{'' if place is None else f' at {place.place(position)}'}, and the device renders "
         f"{_plain(rendered)} {slope_unit} at {1.0 / device.period_s:.6g} Hz"
     ]

@@ -208,6 +208,20 @@ def test_a_device_that_no_realistic_rate_helps_gets_a_bound_and_a_scale_instead_
         assert plan(scaled, weak, energy_account=False).verdict.level == level
 
 
+def test_a_steep_fall_is_stated_with_its_own_place() -> None:
+    """A pull that ends near 3 mm is steeper than the rise at the start of the travel."""
+    weak = DeviceProfile.load(example_profiles()["phantom-premium-1.0"][0])
+    model = keyswitch_by_hand(weight=[-4.0], beta=[[0.0028]], linear=[-8000.0], below="linear")
+    sentence = str(plan(model, weak).verdict)
+    slopes = re.search(
+        r"its slope is down to (-\S+) N/m at (\S+) m of the press, and the device renders (-\S+) N/m",
+        sentence,
+    )
+    assert slopes, sentence
+    x = float(slopes[2]) + np.array([-1e-6, 1e-6])
+    assert np.diff(model.force(x, direction=1.0))[0] / 2e-6 == pytest.approx(float(slopes[1]), rel=0.05)
+
+
 def test_a_rate_is_advised_with_the_place_where_it_can_run() -> None:
     model = model_by_hand(weight=[0.0], linear=[40.0])
     knob = DeviceProfile(viscous_damping=2e-3, coulomb_friction=0.05)
