@@ -426,9 +426,9 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     place = SteepestSlope.of(model, falling=falling)
     slope_unit = f"{force}/{position}"
     sentences = [
-        f"is too steep for this device: its slope is {'down' if falling else 'up'} to {_plain(steepest)} {slope_unit}"
-        f"{'' if place is None else f' at {place.place(position)}'}, and the device renders "
-        f"{_plain(rendered)} {slope_unit} at {1.0 / device.period_s:.6g} Hz"
+        f"is too steep for this device: its slope is {'down' if falling else 'up'} to "
+        f"{_plain(steepest)} {slope_unit}{'' if place is None else f' at {place.place(position)}'}, and the "
+        f"device renders {_plain(rendered)} {slope_unit} at {1.0 / device.period_s:.6g} Hz"
     ]
     if need:
         sentences.append(

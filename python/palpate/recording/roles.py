@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D, Int8Vector
+from ..verdict import FORCE_FLOOR
 from .checks.wrong_readings import repeated_rows, wrong_readings
 from .contact import contact_at
 
@@ -69,7 +70,11 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
         return role
     position, moving = recording.position, recording.motion.moving
     contact = contact_at(position[moving], recording.force[moving])
-    role[~moving] = np.where(position <= contact, Role.REST, Role.HOLD)[~moving]
+    role[~moving] = Role.HOLD
+    rest, force = ~moving & (position <= contact), np.abs(recording.force)
+    # Without rows in air, an object that is loaded from the start waits in contact.
+    if contact > position[moving].min() or (rest.any() and force[rest].mean() <= FORCE_FLOOR * force.max()):
+        role[rest] = Role.REST
     if deepest is not None:
         role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
     return role

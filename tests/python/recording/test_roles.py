@@ -53,6 +53,16 @@ def test_a_wait_in_air_is_a_rest_and_a_wait_in_contact_a_hold() -> None:
     assert (role[352:448] == Role.HOLD).all()
 
 
+def test_a_wait_at_the_smallest_position_of_a_preloaded_object_is_in_contact() -> None:
+    """A gas spring pushes with 150 N from its first position on."""
+    press = np.linspace(0.0, 4e-3, 300)
+    x = np.concatenate([np.zeros(100), press, press[::-1], np.zeros(100)])
+    noise = np.random.default_rng(0).normal(0.0, 0.1, len(x))
+    role = roles_of(palpate.Recording.from_arrays(x, 150.0 + 1e3 * x + noise))
+    assert np.count_nonzero(role == Role.HOLD) > 190
+    assert not (role == Role.REST).any()
+
+
 def test_a_long_approach_is_fitted_only_near_the_contact() -> None:
     x = np.linspace(-40.0, 4.0, 4400)
     role = roles_of(recorded(x, np.maximum(50.0 * x, 0.0)), 4.0)
