@@ -20,6 +20,7 @@ from ..data.rows import Rows
 from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
+from .causes import cause_of
 from .class_selection import (
     REGROWTH_ERROR_RATIO,
     VELOCITY_INPUTS,
@@ -28,7 +29,7 @@ from .class_selection import (
     ModelClass,
     Network,
 )
-from .findings import USABLE_NRMSE
+from .findings import USABLE_NRMSE, judged_candidate
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
 from .shift import shift_of
@@ -81,12 +82,7 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
         repeated.log.replaces(current.log, note)
         current = repeated
-    chosen = min(found, key=lambda each: each[0])[1]
-    full = first.best.stop_reason == "max_wavelets"
-    if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
-        # The residual of this network is a part of the force that needs more wavelets, not noise.
-        return first
-    return chosen
+    return min(found, key=lambda each: each[0])[1]
 
 
 class MassAndDamping(ModelClass):
@@ -156,11 +152,13 @@ class Velocity(ModelClass):
         )
         assert motion is not None
         damped = moving is not None and moving.mass is None
-        if not (damped or below.settled.nrmse > USABLE_NRMSE):
-            return below
         residual = below.static_force - below.force_at()
-        if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
-            return below
+        cause = cause_of(judged_candidate(below))
+        if cause is None or not (cause.of_speed and cause.clear and cause.noticed > 1.0):
+            if not (damped or below.settled.nrmse > USABLE_NRMSE):
+                return below
+            if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:
+                return below
         velocity, known = motion.velocity()
         rows = known
         over_both = Rows(
