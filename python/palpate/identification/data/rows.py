@@ -22,7 +22,7 @@ from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..log import Log
 from ..options import IdentifyOptions
-from .compression import HELD_OUT_EVERY, held_out_rows
+from .compression import held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated, stepped
 from .repeats import Repeats
 from .strokes import stated_strokes, strokes_of
@@ -139,14 +139,8 @@ class Rows:
 
     def held_out(self) -> NDArray[np.bool_]:
         """Returns True (n,) for held-out rows."""
-        held_out = held_out_rows(len(self.force), self.starts)
-        if self.weight is not None:
-            counted = np.flatnonzero(self.weight > 0.0)
-            held_out &= self.weight > 0.0
-            if 2 * HELD_OUT_EVERY * np.count_nonzero(held_out) < len(counted):
-                # if rows repeat at regular distances, most held-out rows can be repeats with weight 0
-                held_out[:] = False
-                held_out[counted] = held_out_rows(len(counted), self.starts)
+        held_out = np.ones(len(self.force), dtype=bool) if self.weight is None else self.weight > 0.0
+        held_out[held_out] = held_out_rows(int(np.count_nonzero(held_out)), self.starts)
         return held_out
 
     def only(self, rows: NDArray[np.bool_]) -> Rows:
