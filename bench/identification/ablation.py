@@ -55,7 +55,7 @@ FILES = 4
 LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
-SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 11611)
+SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 11611)
 """Draws that show a rule which other draws seldom show"""
 
 CHANGED_RATIO = 1.02
@@ -271,6 +271,7 @@ RULES = (
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
+    Rule("velocity needs a part of the residual", f"{CLASSES}.dynamics", "Dynamics.share_of_velocity", _one),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
     Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
