@@ -7,7 +7,7 @@ from bench.identification import growing_loops
 
 def test_loops_that_narrow_at_their_middle_are_called_pinched(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growing_loops, "ROWS_PER_TRAVEL", 100.0)
-    found = growing_loops.measured("Bouc-Wen, pinched", 3)
+    found = growing_loops.measured("Bouc-Wen, pinched", 4)
     assert found["verdict"] == "usable"
     assert found["nrmse"] < 0.25  # 0.38 without the largest play radius
     assert "depends on the position of the last turn" in found["reason"]

@@ -25,7 +25,10 @@ from ...recording.motion import (
     least_error_low_pass,
     long_enough,
     quiet_low_pass,
+    strokes_from_order,
+    turns_of,
 )
+from ...verdict import FORCE_FLOOR
 from ..data.limits import evenly_spread
 from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
@@ -137,10 +140,23 @@ to 2. With a smaller spread damping cannot be distinguished from friction."""
 
 
 def spread_of_speeds(velocity: Float1D) -> float:
-    """Returns the standard deviation of the speed divided by its mean, both averaged over the distance moved,
-    so that pauses and turns have little weight; 0 without a motion."""
-    first, second, third = (float(np.sum(np.abs(velocity) ** power)) for power in (1, 2, 3))
-    return math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0
+    """Returns the standard deviation of the speed in one direction divided by its mean, both averaged over
+    the distance moved, so that pauses and turns have little weight; 0 without a motion.
+
+    Of both directions the larger one counts: one speed of all presses and another one of all releases do not
+    distinguish damping from friction.
+    """
+    spreads = [0.0]
+    for speed in (velocity[velocity > 0.0], -velocity[velocity < 0.0]):
+        first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
+        spreads.append(math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0)
+    return max(spreads)
+
+
+def friction_sign(velocity: Float1D) -> Float1D:
+    """Returns the smoothed sign tanh(v/v0) of velocities v (n,)."""
+    slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(velocity**2)))
+    return np.tanh(velocity / slow) if slow > 0.0 else np.zeros_like(velocity)
 
 
 class Dynamics:
@@ -178,7 +194,7 @@ class Dynamics:
         """
         regression = self._regression(basis, strokes)
         if regression is None:
-            return {}, [Decision(name, "not tested", SHORT_MOTION) for name in TERMS]
+            return {}, [Decision("damping", "not tested", SHORT_MOTION), self._mass_not_tested()]
         decisions: list[Decision] = []
         allowed: tuple[str, ...] = TERMS
         spread = spread_of_speeds(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
@@ -220,6 +236,23 @@ class Dynamics:
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions
 
+    def _mass_not_tested(self) -> Decision:
+        """Returns the decision that mass is not tested, with the mass whose force a hand would feel if each
+        stroke were half a period of a sine."""
+        parts, data = self._data.parts, self._data
+        direction = strokes_from_order(data.path[:, 0])
+        if direction is None or not parts:
+            return Decision("mass", "not tested", SHORT_MOTION)
+        stroke_s = sum(float(np.ptp(part.row_time)) for part in parts) / (1 + turns_of(direction))
+        acceleration = 0.5 * float(data.reach[0]) * (math.pi / stroke_s) ** 2
+        felt = FORCE_FLOOR * float(np.abs(data.force).max()) / data.force_unit.scale
+        mass = f"{felt / acceleration:.2g} {self._unit_of('mass')}".rstrip()
+        limit = (
+            f"if each stroke is half a period of a sine, a mass above {mass} changes the force by more than a "
+            "just noticeable difference"
+        )
+        return Decision("mass", "not tested", f"{SHORT_MOTION}; {limit}")
+
     def _unit_of(self, name: str) -> str:
         """Returns the unit of damping or mass; empty if the units of force and position are not known."""
         force, position = self._data.force_unit.si, self._data.position_unit.si
@@ -246,14 +279,13 @@ class Dynamics:
         """Returns the velocity at every row (n,) as an input, and True (n,) for rows that have one."""
         return at_rows(self._parts, self._low_pass, 1, len(self._data.force))
 
-    def share_of_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
+    def share_of_velocity(self, residual: Float1D, basis: Basis) -> float:
         """Returns the share of the mean square of a residual (n,) that functions of velocity and position
         explain.
 
-        The functions are v|v|, and v times 1, x and psi_i(x), with velocity v, position x and the wavelets
-        psi_i of the force. With `friction`, functions with the smoothed sign of v in place of v are added.
-        Otherwise functions with |v| and 1 in place of v are added, because damping can differ between press
-        and release. The share is corrected for the number of functions.
+        The functions are v|v|, and v, |v|, 1 and the smoothed sign of v times 1, x and psi_i(x), with
+        velocity v, position x and the wavelets psi_i of the force. The share is corrected for the number of
+        functions.
         """
         velocity, known = self.velocity()
         rows = evenly_spread(np.flatnonzero(known))
@@ -261,13 +293,8 @@ class Dynamics:
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
         over_x = np.concatenate([np.ones_like(x), x, basis.columns(x)], 1)
-        columns = [v * np.abs(v), v * over_x]
-        if friction:
-            slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(v * v)))
-            columns.append(np.tanh(v / slow) * over_x)
-        else:
-            columns += [over_x, np.abs(v) * over_x]
-        table = np.concatenate(columns, 1)
+        of_speed = (v, np.abs(v), np.ones_like(v), friction_sign(v))
+        table = np.concatenate([v * np.abs(v), *(each * over_x for each in of_speed)], 1)
         product = table.T @ r
         share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))

@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..._typing import Float1D, Float2D
+from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.checks import findings_of
-from ...recording.motion import TURN_SHARE, noise_band, strokes_from_order
+from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...recording.units import Unit
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
@@ -23,11 +21,10 @@ from ..data.strokes import radius_that_follows, weights_of_shared_errors
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
-from ..network.separable import TINY
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate, RowError, deviance
+from ..search.evidence import Candidate, RowError
+from .causes import MOST_JND, PLACE_ERRORS, PLACES, Judged, cause_of, means_at, places_of
 from .class_selection import VELOCITY_INPUTS, ClassSelection
-from .dynamics import LEAST_SPEED_SPREAD, spread_of_speeds
 from .repeatability import band_with_check, left_out_residual
 from .shift import shift_of
 
@@ -151,7 +148,8 @@ def wait_findings(best: Candidate) -> list[Finding]:
     change = float(np.median(np.abs(force - force[begins][np.cumsum(begins) - 1])))
     reason = f"from the first row of each wait on it changes by {data.force_unit.text(change)}"
     if 2.0 * change > error:
-        record = "" if data.parts else "record time, so that a memory can be identified, or "
+        timed = data.parts or data.names == VELOCITY_INPUTS
+        record = "" if timed else "record time, so that a memory can be identified, or "
         reason += (
             " (relaxation, creep or drift), which a model of position does not show. Cure: "
             f"{record}use the model only while the tool moves"
@@ -165,122 +163,33 @@ def wait_findings(best: Candidate) -> list[Finding]:
     ]
 
 
-PLACES = 100
-"""Number of places of the travel; in each of them the mean residual of each stroke is compared with a just
-noticeable difference."""
-
-PLACE_ERRORS = 2.0
-"""Part of a mean residual that can be random [standard errors]."""
-
-MOST_JND = 2.0
-"""Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
+def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
+    """Returns an accepted candidate; `passive` is True if its hysteresis h must not be below 0."""
+    height = None if best.side is None else lambda box: best.parts_at(box)[1]
+    inputs = _inputs(best.network)
+    return Judged(best.data, best.residual, best.settled.weight, best.side, inputs, height, passive)
 
 
-FASTER = (
-    "at the same position and stroke the force {} with the speed of the stroke, from the slowest to the "
-    "fastest by {}: it depends on the velocity, or the object changed at the same time. Alternate slow "
-    "and fast strokes"
-)
-"""Finding on strokes that differ by their speed, with the way of the change and its size."""
-
-APART = "Cure: identify the cycles of each amplitude separately, with --rows"
-"""Cure for a force that depends on the last turn"""
-
-TURNED = (
-    "the force depends on the position of the last turn{pinched}: at the same position and stroke it {} with "
-    f"that position, by {{}}. {APART}"
-)
-"""Finding on strokes that differ by the turn before them."""
-
-LATER = (
-    "from the first row to the last the force at the same position and stroke {} by {}: the zero of the "
-    "force or the object changed. Let both warm up, press the object several times first, do not set the "
-    "force to zero during the recording, or identify the parts of the recording separately with --rows"
-)
-"""Finding on strokes that differ by their time."""
-
-FIRST = (
-    "behind the first stroke over a position the force there {} by {}: the object or the zero of the force "
-    "changed. Press the object several times before the recording, or leave out the first strokes with --rows"
-)
-"""Finding on a first stroke that differs from the later ones."""
+def findings_over_time(network: FittedNetwork, rows: Rows) -> list[Finding]:
+    """Returns the findings on strokes and places of a model with memory, which has a residual on all rows."""
+    assert network.residual is not None
+    side = rows.order if rows.side is None else rows.side
+    judged = Judged(rows, network.residual, rows.fitted.astype(float), side, _inputs(network))
+    return drift_findings(judged) or place_findings(judged)
 
 
-def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
-    """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
-    place = np.minimum((box[:, 0] * PLACES).astype(np.intp), PLACES - 1)
-    return place if side is None else place + PLACES * (side < 0)
-
-
-def _means(place: NDArray[np.intp], weight: Float1D, *values: Float1D) -> list[Float1D]:
-    """Returns the weighted means (2 PLACES,) of values (n,) in each place and direction; 0 without rows."""
-    total = np.bincount(place, weight, 2 * PLACES)
-    total = np.where(total > 0.0, total, 1.0)
-    return [np.bincount(place, weight * each, 2 * PLACES) / total for each in values]
-
-
-@dataclass(frozen=True)
-class _Strokes:
-    """Rows of strokes, to compare those in the same direction over the same place."""
-
-    rows: NDArray[np.intp]
-    """(k,) indices of the rows with a weight"""
-    weight: Float1D
-    """(k,)"""
-    group: NDArray[np.intp]
-    """(k,) number of the place and the direction"""
-    number: NDArray[np.intp]
-    """(k,) number of the stroke"""
-
-    @classmethod
-    def of(cls, best: Candidate) -> _Strokes | None:
-        """Returns the rows of strokes in recorded order; None without strokes."""
-        if (direction := strokes_from_order(best.data.path[:, 0])) is None:
-            return None
-        rows = np.flatnonzero((best.settled.weight > 0.0) & (direction != 0))
-        group = _places(best.data.box[rows], direction[rows])
-        number = np.cumsum(np.diff(direction[rows], prepend=0) != 0) - 1
-        return cls(rows, best.settled.weight[rows], group, number)
-
-    def properties(self, data: Rows) -> Iterator[tuple[str, Float1D, float]]:
-        """Yields the properties in which strokes over the same place can differ: a sentence, the value (k,)
-        of each row, and the change of the value whose effect the sentence states."""
-        index, starts, rows = np.unique(self.number, return_index=True, return_counts=True)
-        begin = self.rows[starts][self.number]
-        end = self.rows[starts + rows - 1][self.number]
-        if data.parts:
-            time = np.concatenate([piece.row_time for piece in data.parts])
-            lasting, speed = time[end] - time[begin], np.zeros(len(end))
-            np.divide(
-                np.abs(data.path[end, 0] - data.path[begin, 0]), lasting, out=speed, where=lasting > 0.0
-            )
-            if spread_of_speeds(speed) >= LEAST_SPEED_SPREAD:
-                yield FASTER, speed, float(np.ptp(speed))
-        turn = data.path[begin, 0]
-        if (moved := float(np.ptp(self.centred(turn)))) > TURN_SHARE:
-            yield TURNED, turn, moved
-        earliest = np.full(2 * PLACES, len(index))
-        np.minimum.at(earliest, self.group, self.number)
-        yield LATER, 0.5 * (begin + end) / len(data.force), 1.0
-        yield FIRST, (self.number > earliest[self.group]).astype(float), 1.0
-
-    def centred(self, values: Float1D) -> Float1D:
-        """Returns values (k,) minus their weighted mean at each place and direction."""
-        return values - _means(self.group, self.weight, values)[0][self.group]
-
-
-def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
+def place_findings(best: Judged) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
-    hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
-    rows = np.flatnonzero(best.settled.weight > 0.0)
+    hand feels the difference."""
+    rows = np.flatnonzero(best.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
-    data, residual, weight = best.data, best.residual[rows], best.settled.weight[rows]
-    group = _places(data.box[rows], None if best.side is None else best.side[rows])
+    data, residual, weight = best.data, best.residual[rows], best.weight[rows]
+    group = places_of(data.box[rows], None if best.side is None else best.side[rows])
     count = np.bincount(group, weight, 2 * PLACES)
-    mean, force, square = _means(group, weight, residual, data.force[rows], residual**2)
+    mean, force, square = means_at(group, weight, residual, data.force[rows], residual**2)
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1.0, 1.0))
-    jnd = force_jnd(force, _floor(best) or 1.0)
+    jnd = force_jnd(force, best.floor or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
     worst = int(np.argmax(noticed))
     if noticed[worst] <= MOST_JND:
@@ -288,12 +197,15 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
     middle, unit = (worst % PLACES + 0.5) / PLACES, data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
-    reason = _loop_reason(best) or (
-        f"the force there depends on more than {_inputs(best.network)}, such as earlier motion: {more}"
+    cause = cause_of(best)
+    reason = (
+        cause.sentence
+        if cause is not None and cause.clear
+        else f"the force there depends on more than {best.inputs}, such as earlier motion: {more}"
     )
-    if best.side is not None and nonnegative:
+    if best.hysteresis is not None and best.passive:
         loop = (
-            2.0 * best.parts_at(np.array([[middle]]))[1][0]
+            2.0 * best.hysteresis(np.array([[middle]]))[0]
             + mean[worst % PLACES]
             - mean[worst % PLACES + PLACES]
         )
@@ -311,37 +223,6 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     ]
 
 
-def _loop_reason(best: Candidate) -> str:
-    """Returns why the rows differ from the model, if the position of the last turn explains their residuals:
-    the criterion falls by a line over it at each place and direction. An empty text without turns.
-
-    The height of a loop of plays in parallel has no minimum inside the loop (Masing 1926).
-    """
-    if (strokes := _Strokes.of(best)) is None:
-        return ""
-    first, weight = strokes.rows[np.searchsorted(strokes.number, strokes.number)], strokes.weight
-    turn, residual = strokes.centred(best.data.path[first, 0]), strokes.centred(best.residual[strokes.rows])
-    cross, square = (np.bincount(strokes.group, weight * turn * each) for each in (residual, turn))
-    known, n = square > np.finfo(float).eps * len(weight), best.problem.independent
-    before = float(weight @ residual**2)
-    after = before - float(np.sum(cross[known] ** 2 / square[known]))
-    criterion = [deviance("bic", max(rss, TINY), n, p) for rss, p in ((after, int(known.sum())), (before, 0))]
-    if criterion[0] >= criterion[1]:
-        return ""
-    return f"the force there depends on the position of the last turn{_pinched(best)}. {APART}"
-
-
-def _pinched(best: Candidate) -> str:
-    """Returns a clause on loops that are narrower inside than at both sides; empty for other loops."""
-    if best.strokes is None:
-        return ""
-    height = best.parts_at(np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None])[1]
-    sides = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
-    if np.max(np.minimum(*sides) - height) <= MOST_JND * _floor(best):
-        return ""
-    return ", and the loops narrow inside (pinching)"
-
-
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     """Returns what changes in a model without the shift of press against release that the rows show; None
     without such a shift, or if it changes less than the error on the rows."""
@@ -355,8 +236,8 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     )
     force = np.concatenate([true_middle + true_half, true_middle - true_half])
     apart = np.concatenate([middle + half, middle - half]) - force
-    place = _places(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
-    mean_apart, mean_force = _means(place, np.ones(len(place)), apart, force)
+    place = places_of(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
+    mean_apart, mean_force = means_at(place, np.ones(len(place)), apart, force)
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
     rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
     perceptible = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
@@ -387,8 +268,8 @@ def energy_findings(best: Candidate) -> list[Finding]:
     known = np.abs(there[:, 1]) <= min(data.positions[rows, 1].max(), -data.positions[rows, 1].min())
     there, back = there[known], back[known]
     loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
-    place = _places(data.box[rows][known], None)
-    mean, force = _means(place, np.ones(len(place)), loop, data.force[rows][known])
+    place = places_of(data.box[rows][known], None)
+    mean, force = means_at(place, np.ones(len(place)), loop, data.force[rows][known])
     gained = -mean / force_jnd(force, _floor(best) or 1.0)
     worst = int(np.argmax(gained))
     if gained[worst] <= MOST_JND:
@@ -403,40 +284,11 @@ def energy_findings(best: Candidate) -> list[Finding]:
     ]
 
 
-def drift_findings(best: Candidate) -> list[Finding]:
+def drift_findings(best: Judged) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
-    noticeable difference. One press and release cannot show this.
-
-    The residuals are fitted over each property of the strokes, with a slope for each direction, and the
-    property that explains most is named.
-    """
-    data = best.data
-    if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
-        return []
-    rows, weight, residual = strokes.rows, strokes.weight, strokes.centred(best.residual[strokes.rows])
-    way, least = strokes.group // PLACES, np.finfo(float).eps * len(rows)
-    free = len(rows) - len(np.unique(strokes.group)) - len(np.unique(way))
-    found = []
-    for reason, values, span in strokes.properties(data) if free > 0 else ():
-        moment = strokes.centred(values)
-        cross, square = (np.bincount(way, weight * moment * each) for each in (residual, moment))
-        if not square.sum() > least:
-            continue
-        slope = np.divide(cross, square, out=np.zeros_like(cross), where=square > least)
-        noise = residual - slope[way] * moment
-        left, change = float(weight @ noise**2), float(cross.sum() / square.sum()) * span
-        independent = max(1.0, free * (1.0 - max(neighbour_correlation(noise), 0.0)))
-        excess = abs(change) - PLACE_ERRORS * span * float(np.sqrt(left / square.sum() / independent))
-        if excess > _floor(best):
-            found.append((left, reason, change, excess / _floor(best)))
-    if not found:
-        return []
-    # All properties of two strokes explain the same: the first of them in the list is named.
-    most = min(left for left, *_ in found) + least * float(weight @ residual**2)
-    _, reason, change, noticed = next(each for each in found if each[0] <= most)
-    difference = f"{data.force_unit.text(abs(change))}, {noticed:.2g} just noticeable differences"
-    rises = "rises" if change > 0.0 else "falls"
-    return [usable(reason.format(rises, difference, pinched=_pinched(best)))]
+    noticeable difference. One press and release cannot show this."""
+    cause = cause_of(best)
+    return [usable(cause.sentence)] if cause is not None and cause.noticed > 1.0 else []
 
 
 def _floor(best: Candidate) -> float:
@@ -501,7 +353,7 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
-    if best.error.rmse <= _floor(best) and not place_findings(best, nonnegative=False):
+    if best.error.rmse <= _floor(best) and not place_findings(judged_candidate(best)):
         return []
     return [
         usable(
@@ -549,6 +401,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         notes, findings = [*notes, note], findings + of_period
     settled = _judged_error(best, options.search.contact_share)
     findings += wait_findings(best) + _of_reversal(best, settled)
+    judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
     shift = effect_of_shift(selection)
     findings += (
@@ -556,8 +409,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or log.findings
         or energy_findings(best)
         or limit_findings(best, options)
-        or drift_findings(best)
-        or place_findings(best, options.hysteresis_nonnegative)
+        or drift_findings(judged)
+        or place_findings(judged)
     )
     share, left_out = np.where(data.fitted, best.share, 1.0), left_out_residual(selection)
     if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":

@@ -20,6 +20,7 @@ from ..data.rows import Rows
 from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
+from .causes import cause_of
 from .class_selection import (
     REGROWTH_ERROR_RATIO,
     VELOCITY_INPUTS,
@@ -28,7 +29,7 @@ from .class_selection import (
     ModelClass,
     Network,
 )
-from .findings import USABLE_NRMSE
+from .findings import USABLE_NRMSE, judged_candidate
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
 from .shift import shift_of
@@ -151,13 +152,16 @@ class Velocity(ModelClass):
         )
         assert motion is not None
         damped = moving is not None and moving.mass is None
-        if not (damped or below.settled.nrmse > USABLE_NRMSE):
-            return below
         residual = below.static_force - below.force_at()
-        if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
+        cause = cause_of(judged_candidate(below))
+        if cause is None or not (cause.of_speed and cause.clear and cause.noticed > 1.0):
+            if not (damped or below.settled.nrmse > USABLE_NRMSE):
+                return below
+            if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:
+                return below
+        velocity, rows = motion.velocity()
+        if not rows.any():
             return below
-        velocity, known = motion.velocity()
-        rows = known
         over_both = Rows(
             VELOCITY_INPUTS,
             np.column_stack([data.positions, velocity])[rows],
