@@ -349,6 +349,19 @@ def test_a_first_reading_that_is_not_judged_changes_the_curve_little() -> None:
     assert difference_from_clean(palpate.identify(recorded(PRESS, changed(FORCE, {0: 30.0})))) < 0.1
 
 
+def test_real_rows_where_one_of_several_strokes_lets_go_are_not_wrong_readings() -> None:
+    """One of three pulls lets go 0.1 mm earlier than the model, with a row on its way to zero."""
+    x = np.tile(np.arange(0.0, 14.0, 0.03), 3)
+    first = np.arange(len(x)) < len(x) // 3
+    let_go = np.where(first, 8.9, 9.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.05, len(x))
+    force = np.where(x < let_go, 30.0 * np.tanh(x / 6.0) + 0.8 * x, 0.0) + noise
+    residual = force - np.where(x < 9.0, 30.0 * np.tanh(x / 6.0) + 0.8 * x, 0.0)
+    assert not wrong_readings(x, x, force, (), residual).any()
+    force[200], residual[200] = force[200] + 20.0, residual[200] + 20.0
+    assert np.flatnonzero(wrong_readings(x, x, force, (), residual)).tolist() == [200]
+
+
 def test_an_error_of_the_model_that_occurs_again_is_not_a_wrong_reading() -> None:
     x = np.tile(np.concatenate([PRESS[:400:8], PRESS[400::8]]), 4)
     contact = 0.4 * x.max()
@@ -357,9 +370,9 @@ def test_an_error_of_the_model_that_occurs_again_is_not_a_wrong_reading() -> Non
     once = np.zeros(len(x))
     once[130] = 5.0
     residual = random + once
-    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x, (), residual)).tolist() == [130]
+    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x + residual, (), residual)).tolist() == [130]
     residual[at_contact] += np.random.default_rng(4).uniform(2.0, 5.0, len(at_contact))
-    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x, (), residual)).tolist() == [130]
+    assert np.flatnonzero(wrong_readings(x, x, 10.0 * x + residual, (), residual)).tolist() == [130]
 
 
 @pytest.mark.parametrize("seed", [0, 4])
