@@ -159,4 +159,6 @@ def squared_error_change(share: float, error: float, on: str) -> str:
     on : str
         Name of the rows on which the error was computed.
     """
+    if share < -1.0:
+        return f"raises the squared error on {on} to {_short(1.0 - share)} times"
     return f"{_verb(share)} the squared error on {on} by {_short(100.0 * share)} +- {100.0 * error:.2g} %"

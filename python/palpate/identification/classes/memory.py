@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._core.model import ForceModel, wavelet_columns
+from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.contact import contact_at
@@ -29,7 +29,7 @@ from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
 from .findings import USABLE_NRMSE
-from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
+from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape, balanced
 
 MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
@@ -79,8 +79,7 @@ class Choice:
         return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
 
     def rms(self) -> float:
-        """Returns the RMS error of the force, without the weighted curvature."""
-        return float(np.sqrt(np.mean(self.fit.error(self.shape) ** 2)))
+        return self.fit.rms(self.shape)
 
     def value(self, rows: float, criterion: str) -> float:
         used = 0 if self.shape is None else self.shape.n_parameters
@@ -171,18 +170,31 @@ class Recorded:
     spread: float
     near_zero: float
     """Largest |force| without contact [force]; below 0 if the tool cannot leave the object"""
+    left: str
+    """Side on which the tool leaves the object, "below" or "above"; empty if it cannot"""
+    below: str
+    """Continuation of the force below the domain"""
+    above: str
+    """The same above the domain"""
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], found: FittedNetwork, options: IdentifyOptions) -> Recorded:
         force = np.concatenate([part.force for part in recordings])
-        near_zero = options.search.contact_share * float(np.ptp(force))
-        # A network of several inputs does not state what is below its domain.
-        below = found.below if len(found.lower) == 1 else options.below
-        if below == "linear" or (options.below == "auto" and force.min() < -near_zero):
-            near_zero = -1.0  # some rows are pulled
         position = np.concatenate([part.position for part in recordings])
-        lower = float(position.min()) if near_zero < 0.0 else contact_at(position, force)
-        return cls(recordings, lower, float(position.max()) - lower, float(np.std(force)), near_zero)
+        ends = [float(position.min()), float(position.max())]
+        near_zero, left = options.search.contact_share * float(np.ptp(force)), ""
+        outside = []
+        # A network of several inputs does not state what is outside its domain.
+        stated = found if len(found.lower) == 1 else options
+        # An object that is pressed towards smaller positions is a mirror image: the tool leaves it above.
+        for end, (side, into) in enumerate({"below": 1.0, "above": -1.0}.items()):
+            free, chosen = getattr(stated, side) != "linear", getattr(options, side)
+            if not left and free and (chosen == "free" or (into * force).min() >= -near_zero):
+                left, ends[end] = side, into * contact_at(into * position, into * force)
+            outside.append("free" if side == left or chosen == "free" else "linear")
+        lower, upper = ends
+        spread = float(np.std(force))
+        return cls(recordings, lower, upper - lower, spread, near_zero if left else -1.0, left, *outside)
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:
@@ -199,6 +211,17 @@ class Recorded:
         used = [each[self.every][m.touched] for each, m in zip(values, self.motions, strict=True)]
         return np.concatenate(used)
 
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """True for each row of all recordings at which the tool moves."""
+        return np.concatenate([roles_of(part) == Role.MOVING for part in self.recordings])
+
+    @cached_property
+    def spread_of_motion(self) -> float:
+        """Standard deviation of the force at the rows at which the tool moves [force]."""
+        force = np.concatenate([part.force for part in self.recordings])
+        return float(np.std(force[self.moving])) or self.spread
+
     def _motion(self, part: Recording) -> Motion:
         time, position, force = (
             values[self.every] for values in (part.time_or_row, part.position, part.force)
@@ -206,7 +229,8 @@ class Recorded:
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
         touched = np.abs(force) > self.near_zero
         touched[: np.argmax(touched)] = True  # before its first contact the object is at rest
-        return Motion(time, box, force / self.spread, touched)
+        moving = roles_of(part)[self.every] == Role.MOVING
+        return Motion(time, box, force / self.spread, touched, moving)
 
     @cached_property
     def ranges(self) -> Ranges:
@@ -342,7 +366,7 @@ def better_with_memory(
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
         return _refused(found, _gain_text(in_sample, 0.0))
-    at_rest = recorded.at_rest(choice, identify_rest)
+    at_rest = replace(recorded.at_rest(choice, identify_rest), below=recorded.below, above=recorded.above)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
     refined = shape.without_idle(fit.solved(shape)[1])
@@ -367,12 +391,15 @@ def better_with_memory(
         linear=recorded.spread / recorded.travel * coefficients[-2:-1],
         bias=recorded.spread * float(coefficients[-1] - coefficients[-2] * recorded.lower / recorded.travel),
         memory=recorded.memory(refined, stiffness),
-        below="linear" if recorded.near_zero < 0.0 else "free",
     )
     residual = recorded.spread * fit.error(refined)
     error, where_sure = _rms(residual, compared.weight), _rms(residual, compared.sure)
-    of_rows = _residual(network, recordings)
-    of_all = _rms(of_rows, np.array(1.0))
+    law = network.force_model()
+    of_rows = np.concatenate(
+        [part.force - law.force_over_time(part.time_or_row, part.position)[0] for part in recordings]
+    )
+    # Rows that wait hide no error of the rows that move, however many they are.
+    of_all = max(_rms(of_rows, recorded.moving), _rms(of_rows, ~recorded.moving))
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
@@ -402,7 +429,8 @@ def better_with_memory(
     if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
-    nrmse = of_all / recorded.spread
+    nrmse = of_all / recorded.spread_of_motion
+    left_out_nrmse *= recorded.spread / recorded.spread_of_motion
     return replace(
         network,
         model_class="memory",
@@ -416,12 +444,13 @@ def better_with_memory(
         residual=of_rows,
         share=None,
         residuals=len(of_rows),
+        independent_rows=fit.independent(refined),
         log=Log(
             found.log.path + network.log.path,
             [*found.log.decisions, decision],
             found.log.rows,
             [*found.log.notes, *_branches(recorded, refined)],
-            [*_undetermined(found, recordings), *_forgotten(network, recordings[0], of_all, error)],
+            [*_undetermined(found, recordings), *_forgotten(recorded, of_all, error)],
         ),
     )
 
@@ -454,18 +483,16 @@ def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iter
             )
 
 
-def _forgotten(
-    network: FittedNetwork, recording: Recording, of_all: float, in_contact: float
-) -> Iterator[Finding]:
+def _forgotten(recorded: Recorded, of_all: float, in_contact: float) -> Iterator[Finding]:
     """Yields a finding if the model is good in contact only: where the tool leaves the object, the branches
     are released, because a branch that stays stretched would pull the tool. The errors are RMS errors."""
-    good = USABLE_NRMSE * float(np.std(recording.force))
-    if network.below == "free" and in_contact <= good < of_all:
-        force = recording.file_unit("force")
+    good = USABLE_NRMSE * recorded.spread_of_motion
+    if recorded.left and in_contact <= good < of_all:
+        force = recorded.recordings[0].file_unit("force")
         yield usable(
             "the model forgets how far the object had relaxed when the tool leaves it and returns: the "
             f"RMS error is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in "
-            "contact, or give --below linear, with which the model remembers but pulls the tool"
+            f"contact, or give --{recorded.left} linear, with which the model remembers but pulls the tool"
         )
 
 
@@ -488,7 +515,7 @@ class _Compared:
     """Rows on which a memory is compared with the model without it, and the errors of the latter."""
 
     weight: Float1D
-    """(n,) weight in the fit of a row behind a turn, 1 of the others"""
+    """(n,) weight in the fit without memory, times that of rows that wait"""
     sure: Float1D
     """(n,) the same, and 0 without force and for a wait between press and release, where friction may
     creep"""
@@ -519,22 +546,12 @@ class _Compared:
             )
             strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
             outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
+        share = share * balanced(moving)
         sure = share * (moving | (outside != 0.0)) * (np.abs(force) > recorded.near_zero)
         return cls(share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure))
 
 
-def _rms(residual: Float1D, weight: Float1D) -> float:
+def _rms(residual: Float1D, weight: NDArray[Any]) -> float:
     """Returns the RMS of residuals (n,) with weights (n,) or one weight; 0 without a weight above 0."""
     total = float(np.sum(np.broadcast_to(weight, residual.shape)))
     return float(np.sqrt(np.sum(weight * residual**2) / total)) if total else 0.0
-
-
-def _residual(network: FittedNetwork, recordings: Sequence[Recording]) -> Float1D:
-    """Returns the force of all rows of recordings minus that of a model with memory (n,) [force]."""
-    assert network.memory is not None
-    model = ForceModel(
-        **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
-    )
-    return np.concatenate(
-        [part.force - model.force_over_time(part.time_or_row, part.position)[0] for part in recordings]
-    )

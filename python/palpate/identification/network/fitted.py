@@ -142,9 +142,12 @@ class FittedNetwork:
         }
 
     def force_model(self) -> ForceModel:
-        """Returns the force law over the domain; it is periodic if it has harmonics."""
+        """Returns the force law; it is periodic if it has harmonics."""
         period = float(self.upper[0] - self.lower[0]) if self.harmonics else None
-        return ForceModel(**self.parameters(), period=period)
+        memory = None if self.memory is None else self.memory.memory()
+        return ForceModel(
+            **self.parameters(), below=self.below, above=self.above, period=period, memory=memory
+        )
 
     def fit(self) -> Fit:
         """Returns the model class and the tested networks, in the form of a model file."""

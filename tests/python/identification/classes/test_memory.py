@@ -12,6 +12,8 @@ import palpate
 from conftest import sampled
 from palpate import Model, Recording
 from palpate._core.model import Memory, play, stretches
+from palpate.identification.classes.memory_fit import balanced
+from palpate.identification.log import squared_error_change
 from palpate.planning import hand_for, rig_for
 from palpate.planning.simulation import holding_hand
 
@@ -389,6 +391,58 @@ def test_a_pad_that_the_tool_leaves_gets_a_memory() -> None:
     held = x == x.max()
     error = (model.force_over_time(time, x)[0] - force)[held]
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.ptp(force[held])
+
+
+def test_a_mirrored_pad_gets_the_error_of_the_model_that_is_returned() -> None:
+    time, x, force = left_pad()
+    model = palpate.identify(-x, -force, time=time)
+    assert model.memory is not None
+    assert (model.below, model.above) == ("linear", "free")
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.6], rtol=0.05)
+    found = model.force_over_time(time, -x)[0]
+    assert found.max() <= 0.0
+    moving = np.r_[True, np.diff(x) != 0.0]
+    error = np.sqrt(np.mean((found + force)[moving] ** 2)) / force[moving].std()
+    assert model.fit.nrmse == pytest.approx(error, rel=0.02)
+
+
+@pytest.mark.full
+def test_long_waits_do_not_hide_an_error_of_the_strokes() -> None:
+    """Each stroke is stiffer than the one before; the waits are not."""
+    errors = []
+    for wait in (30, 300):
+        press, stays = np.linspace(0.1, 1.0, 60), np.ones(wait)
+        position = np.tile(np.concatenate([press, stays, press[::-1], 0.1 * stays]), 4)
+        time, stroke = 0.02 * np.arange(len(position)), np.repeat(np.arange(4), 2 * (60 + wait))
+        stiffer = np.where(np.diff(position, prepend=0.1) != 0.0, 0.82 + 0.12 * stroke, 1.0)
+        force = stiffer * relaxing([2.0], [0.7]).force_over_time(time, position)[0]
+        model = palpate.identify(position, with_noise(force, 0.005), time=time)
+        assert model.memory is not None
+        assert any("from the first row to the last" in each for each in model.verdict.reasons)
+        errors.append(model.fit.nrmse)
+    assert min(errors) > 0.15
+    assert errors[1] == pytest.approx(errors[0], rel=0.15)
+
+
+def test_rows_that_wait_count_at_most_as_much_as_those_that_move() -> None:
+    moving = np.repeat([True, False], [10, 40])
+    assert balanced(moving)[~moving].sum() == pytest.approx(10.0)
+    assert (balanced(moving)[moving] == 1.0).all()
+    assert (balanced(~moving) == 1.0).all()
+
+
+def test_strokes_that_differ_are_found_in_the_residual_of_the_memory() -> None:
+    time, position = ramps_and_holds(1, 0.04)
+    force = relaxing([2.0], [0.7]).force_over_time(time, position)[0] * (1.0 + 0.1 * time / time[-1])
+    model = palpate.identify(position, with_noise(force, 0.005), time=time)
+    assert model.memory is not None
+    assert model.fit.nrmse < 0.1
+    assert "from the first row to the last" in model.verdict.reasons[0]
+
+
+def test_a_large_rise_of_the_error_is_stated_as_a_multiple() -> None:
+    text = squared_error_change(-569.79, 0.0, "held-out sections")
+    assert text == "raises the squared error on held-out sections to 571 times"
 
 
 def test_a_network_of_velocity_is_judged_in_the_waits() -> None:
