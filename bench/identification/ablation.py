@@ -297,7 +297,7 @@ RULES = (
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
     constant(f"{CLASSES}.findings.left_out_residual", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),
     constant(f"{CLASSES}.model_selection.correlated_noise", "LEAST_INDEPENDENT_SHARE", 0.0),
-    constant(f"{CLASSES}.findings.place_findings", "PLACES", 200),
+    constant(f"{CLASSES}.findings.place_findings", "PLACES", 200, f"{CLASSES}.causes"),
     constant(f"{CLASSES}.findings.place_findings", "PLACE_ERRORS", 0.0),
     constant(f"{CLASSES}.findings.place_findings", "MOST_JND", 1.0),
 )

@@ -203,9 +203,9 @@ class _Strokes:
 def cause_of(best: Judged) -> Cause | None:
     """Returns the cause of what differs between strokes over the same place; None if nothing can differ.
 
-    Of the causes that a hand feels, or else of all, that with the least BIC is taken, and an earlier one of
-    the list if its BIC is higher by less than the evidence for a model class: two strokes show the same for
-    most causes.
+    Causes that a hand notices are preferred. The one with the least BIC is taken, or an earlier one of the
+    list if its BIC is higher by less than the evidence for a model class: two strokes show the same for most
+    causes.
     """
     data = best.data
     if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:

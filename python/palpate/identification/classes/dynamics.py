@@ -245,11 +245,11 @@ class Dynamics:
             return Decision("mass", "not tested", SHORT_MOTION)
         stroke_s = sum(float(np.ptp(part.row_time)) for part in parts) / (1 + turns_of(direction))
         acceleration = 0.5 * float(data.reach[0]) * (math.pi / stroke_s) ** 2
-        felt = FORCE_FLOOR * float(np.abs(data.force).max()) / data.force_unit.scale
-        mass = f"{felt / acceleration:.2g} {self._unit_of('mass')}".rstrip()
+        noticed = FORCE_FLOOR * float(np.abs(data.force).max()) / data.force_unit.scale
+        mass = f"{noticed / acceleration:.2g} {self._unit_of('mass')}".rstrip()
         limit = (
-            f"if each stroke is half a period of a sine, a mass above {mass} changes the force by more than a "
-            "just noticeable difference"
+            f"if each stroke is half a period of a sine, a mass above {mass} changes the force by more than "
+            "a just noticeable difference"
         )
         return Decision("mass", "not tested", f"{SHORT_MOTION}; {limit}")
 

@@ -23,7 +23,7 @@ from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
-from .causes import MOST_JND, PLACE_ERRORS, PLACES, Judged, cause_of, means_at, places_of
+from .causes import MOST_JND, PLACE_ERRORS, Judged, cause_of, means_at, places_of
 from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_residual
 from .shift import shift_of
@@ -186,16 +186,16 @@ def place_findings(best: Judged) -> list[Finding]:
         return []
     data, residual, weight = best.data, best.residual[rows], best.weight[rows]
     group = places_of(data.box[rows], None if best.side is None else best.side[rows])
-    count = np.bincount(group, weight, 2 * PLACES)
     mean, force, square = means_at(group, weight, residual, data.force[rows], residual**2)
+    count, places = np.bincount(group, weight, len(mean)), len(mean) // 2
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1.0, 1.0))
     jnd = force_jnd(force, best.floor or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
     worst = int(np.argmax(noticed))
     if noticed[worst] <= MOST_JND:
         return []
-    stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
-    middle, unit = (worst % PLACES + 0.5) / PLACES, data.force_unit
+    stroke = "" if best.side is None else (" of the release" if worst >= places else " of the press")
+    middle, unit = (worst % places + 0.5) / places, data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
     cause = cause_of(best)
     reason = (
@@ -206,8 +206,8 @@ def place_findings(best: Judged) -> list[Finding]:
     if best.hysteresis is not None and best.passive:
         loop = (
             2.0 * best.hysteresis(np.array([[middle]]))[0]
-            + mean[worst % PLACES]
-            - mean[worst % PLACES + PLACES]
+            + mean[worst % places]
+            - mean[worst % places + places]
         )
         if loop < 0.0:
             reason = (
@@ -274,7 +274,9 @@ def energy_findings(best: Candidate) -> list[Finding]:
     worst = int(np.argmax(gained))
     if gained[worst] <= MOST_JND:
         return []
-    position = data.position_unit.text(float(data.lower[0] + data.reach[0] * (worst + 0.5) / PLACES))
+    position = data.position_unit.text(
+        float(data.lower[0] + data.reach[0] * (worst + 0.5) / (len(mean) // 2))
+    )
     return [
         usable(
             f"at {position} the force of a release is {data.force_unit.text(-float(mean[worst]))} above that "
