@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ LEAST_MOMENT = 1e-6
 errors"""
 
 
-def places_of(box: Float2D, side: NDArray[np.generic] | None) -> NDArray[np.intp]:
+def places_of(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
     """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
     place = np.minimum((box[:, 0] * PLACES).astype(np.intp), PLACES - 1)
     return place if side is None else place + PLACES * (side < 0)
