@@ -87,8 +87,8 @@ def wrong_readings(
 
     A residual (n,), the force minus that of a model, is compared in place of the values: it does not change
     along a steep part. It must also be far larger than the residuals of other strokes in the same direction
-    at the same position, where an error of the model occurs again, and the force must not be between those of
-    the rows before and after.
+    at the same position, where an error of the model occurs again. Successive rows must not be between those
+    before and after them: where a force lets go, rows of one of several strokes are.
     """
     found = np.zeros(len(force), dtype=bool)
     if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
@@ -102,18 +102,18 @@ def wrong_readings(
         return np.zeros(len(force), dtype=bool)
     if residual is not None and found.any():
         found[found] = np.abs(residual[found]) > WRONG_RATIO * _of_other_strokes(residual, position, found)
-        found[found] = _beyond_neighbours(force, found)
+        several = np.convolve(found, (1, 0, 1), "same")[found] > 0
+        found[found] = ~several | (_beyond_neighbours(force, found) > _reach_and_least(force)[1])
     return found
 
 
-def _beyond_neighbours(force: Float1D, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Returns True (k,) for those of the rows (n,) whose force is not between that of the nearest other rows
-    before and after them: where a force lets go, the rows of one of several strokes are between them."""
+def _beyond_neighbours(values: Float1D, rows: NDArray[np.bool_]) -> Float1D:
+    """Returns how far the values (k,) of the rows (n,) are outside the interval between those of the nearest
+    other rows before and after them; below 0 inside it."""
     others, at = np.flatnonzero(~rows), np.flatnonzero(rows)
     after = np.searchsorted(others, at)
-    around = force[others[[np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)]]]
-    away = np.maximum(force[at] - around.max(axis=0), around.min(axis=0) - force[at])
-    return np.asarray(away > _reach_and_least(force[others])[1])
+    around = values[others[[np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)]]]
+    return np.asarray(np.maximum(values[at] - around.max(axis=0), around.min(axis=0) - values[at]))
 
 
 def _of_other_strokes(residual: Float1D, position: Float1D, rows: NDArray[np.bool_]) -> Float1D:
