@@ -350,10 +350,10 @@ def test_a_first_reading_that_is_not_judged_changes_the_curve_little() -> None:
 
 
 def test_real_rows_where_one_of_several_strokes_lets_go_are_not_wrong_readings() -> None:
-    """One of three pulls lets go five rows earlier than the model."""
+    """One of three pulls lets go three rows earlier than the model."""
     x = np.tile(np.arange(0.0, 14.0, 0.03), 3)
     first = np.arange(len(x)) < len(x) // 3
-    let_go = np.where(first, 8.85, 9.0)
+    let_go = np.where(first, 8.9, 9.0)
     noise = np.random.default_rng(0).normal(0.0, 0.05, len(x))
     force = np.where(x < let_go, 30.0 * np.tanh(x / 6.0) + 0.8 * x, 0.0) + noise
     residual = force - np.where(x < 9.0, 30.0 * np.tanh(x / 6.0) + 0.8 * x, 0.0)
