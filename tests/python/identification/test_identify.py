@@ -223,6 +223,14 @@ def test_a_button_that_is_pressed_towards_smaller_positions_is_the_mirror_image(
     assert model.force(-BELOW, direction=np.ones(2)) == pytest.approx(0.0, abs=0.02)
 
 
+def test_an_object_that_attracts_towards_its_stop_does_not_let_the_tool_leave_there() -> None:
+    """The pull of a solenoid grows up to its stop and has one sign."""
+    x = np.linspace(0.0, 12e-3, 400)
+    force = -12.0 / (1.0 + (12e-3 - x) / 1e-3) ** 2
+    model = identify(x, force, below="linear", max_wavelets=8)
+    assert (model.below, model.above) == ("linear", "linear")
+
+
 def test_an_object_that_pulls_in_the_recording_continues_below_it() -> None:
     x = press_and_release(400) - 2.0
     f = 3.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))

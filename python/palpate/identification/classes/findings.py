@@ -303,9 +303,11 @@ def _outside(best: Candidate, options: IdentifyOptions, into: float) -> tuple[st
     the end of the travel to the domain.
 
     An object that is pressed towards smaller positions, with forces below zero, is the mirror image of one
-    that is pressed towards larger positions.
+    that is pressed towards larger positions. One that is stated to attract the tool is not pressed so.
     """
     data, choice = best.data, options.below if into > 0.0 else options.above
+    if into < 0.0 and choice == "auto" and options.below == "linear":
+        choice = "linear"
     if choice != "auto":
         return choice, 0.0
     near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
