@@ -23,7 +23,7 @@ from ..recording.roles import Informative, role_counts, unused_rows
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
-from .classes.findings import USABLE_NRMSE, findings_over_time, identified, verdict_of
+from .classes.findings import USABLE_NRMSE, identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
@@ -186,11 +186,7 @@ def _with_memory(
     support it, the options with its period, and its rows."""
     network, chosen, rows = _fitted_with_period(fitted, options, objects)
     rest = _resting(rows, chosen)
-    network = better_with_memory(network, recordings, len(rows.force), chosen, rest)
-    if network.memory is not None and not network.log.findings:
-        found = findings_over_time(network, rows_of(recordings, chosen, objects))
-        network = replace(network, log=network.log + Log(findings=found))
-    return network, chosen, rows
+    return better_with_memory(network, recordings, len(rows.force), chosen, rest), chosen, rows
 
 
 def _fitted_with_period(

@@ -24,12 +24,13 @@ from ...recording.contact import contact_at
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocity
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
+from ..data.rows import rows_of
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
-from .findings import USABLE_NRMSE
-from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape, balanced
+from .findings import USABLE_NRMSE, findings_over_time
+from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
@@ -79,7 +80,7 @@ class Choice:
         return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
 
     def rms(self) -> float:
-        return self.fit.rms(self.shape)
+        return float(np.sqrt(np.mean(self.fit.error(self.shape) ** 2)))
 
     def value(self, rows: float, criterion: str) -> float:
         used = 0 if self.shape is None else self.shape.n_parameters
@@ -212,15 +213,20 @@ class Recorded:
         return np.concatenate(used)
 
     @cached_property
-    def moving(self) -> NDArray[np.bool_]:
-        """True for each row of all recordings at which the tool moves."""
-        return np.concatenate([roles_of(part) == Role.MOVING for part in self.recordings])
+    def moving(self) -> list[NDArray[np.bool_]]:
+        """True for each row of each recording at which the tool moves; the other rows wait."""
+        return [roles_of(part) == Role.MOVING for part in self.recordings]
 
     @cached_property
-    def spread_of_motion(self) -> float:
-        """Standard deviation of the force at the rows at which the tool moves [force]."""
+    def weight(self) -> Float1D:
+        """Weight of each row of all recordings in the errors that are judged."""
+        return balanced(np.concatenate(self.moving))
+
+    @cached_property
+    def judged_spread(self) -> float:
+        """Standard deviation of the force with these weights [force]."""
         force = np.concatenate([part.force for part in self.recordings])
-        return float(np.std(force[self.moving])) or self.spread
+        return _rms(force - np.average(force, weights=self.weight), self.weight)
 
     def _motion(self, part: Recording) -> Motion:
         time, position, force = (
@@ -229,8 +235,7 @@ class Recorded:
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
         touched = np.abs(force) > self.near_zero
         touched[: np.argmax(touched)] = True  # before its first contact the object is at rest
-        moving = roles_of(part)[self.every] == Role.MOVING
-        return Motion(time, box, force / self.spread, touched, moving)
+        return Motion(time, box, force / self.spread, touched)
 
     @cached_property
     def ranges(self) -> Ranges:
@@ -362,7 +367,7 @@ def better_with_memory(
         return _refused(found, "no branch lowers the criterion")
     compared = _Compared.of(found, recorded)
     before = (compared.rmse / recorded.spread) ** 2
-    in_sample = 1.0 - choice.rms() ** 2 / before
+    in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
         return _refused(found, _gain_text(in_sample, 0.0))
@@ -398,8 +403,7 @@ def better_with_memory(
     of_rows = np.concatenate(
         [part.force - law.force_over_time(part.time_or_row, part.position)[0] for part in recordings]
     )
-    # Rows that wait hide no error of the rows that move, however many they are.
-    of_all = max(_rms(of_rows, recorded.moving), _rms(of_rows, ~recorded.moving))
+    of_all = _rms(of_rows, recorded.weight)
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
@@ -412,7 +416,7 @@ def better_with_memory(
             found,
             f"if the force creeps between press and release in pauses, it raises the RMS error from {change}",
         )
-    held_out = fit.held_out_errors(refined)
+    held_out = fit.held_out_errors(refined, compared.balance)
     left_out_nrmse = float(np.sqrt(held_out.mean()))
     gain = 1.0 - max(error / recorded.spread, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
@@ -429,9 +433,9 @@ def better_with_memory(
     if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
-    nrmse = of_all / recorded.spread_of_motion
-    left_out_nrmse *= recorded.spread / recorded.spread_of_motion
-    return replace(
+    nrmse = of_all / recorded.judged_spread
+    left_out_nrmse *= recorded.spread / recorded.judged_spread
+    network = replace(
         network,
         model_class="memory",
         n_parameters=n_parameters,
@@ -444,15 +448,18 @@ def better_with_memory(
         residual=of_rows,
         share=None,
         residuals=len(of_rows),
-        independent_rows=fit.independent(refined),
         log=Log(
             found.log.path + network.log.path,
             [*found.log.decisions, decision],
             found.log.rows,
             [*found.log.notes, *_branches(recorded, refined)],
-            [*_undetermined(found, recordings), *_forgotten(recorded, of_all, error)],
+            list(_undetermined(found, recordings)),
         ),
     )
+    findings = findings_over_time(network, rows_of(recordings, options))
+    if recorded.left and 2.0 * error**2 <= of_all**2 and (findings or nrmse > USABLE_NRMSE):
+        findings = [_forgotten(recorded, of_all, error)]
+    return replace(network, log=network.log + Log(findings=findings))
 
 
 def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
@@ -483,17 +490,16 @@ def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iter
             )
 
 
-def _forgotten(recorded: Recorded, of_all: float, in_contact: float) -> Iterator[Finding]:
-    """Yields a finding if the model is good in contact only: where the tool leaves the object, the branches
-    are released, because a branch that stays stretched would pull the tool. The errors are RMS errors."""
-    good = USABLE_NRMSE * recorded.spread_of_motion
-    if recorded.left and in_contact <= good < of_all:
-        force = recorded.recordings[0].file_unit("force")
-        yield usable(
-            "the model forgets how far the object had relaxed when the tool leaves it and returns: the "
-            f"RMS error is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in "
-            f"contact, or give --{recorded.left} linear, with which the model remembers but pulls the tool"
-        )
+def _forgotten(recorded: Recorded, of_all: float, in_contact: float) -> Finding:
+    """Returns a finding on a model whose error comes from the rows behind those without contact: where the
+    tool leaves the object, the branches are released, because a branch that stays stretched would pull the
+    tool. The errors are RMS errors."""
+    force = recorded.recordings[0].file_unit("force")
+    return usable(
+        "the model forgets how far the object had relaxed when the tool leaves it and returns: the RMS error "
+        f"is {force.text(of_all)}, in contact {force.text(in_contact)}. Cure: stay in contact, or give "
+        f"--{recorded.left} linear, with which the model remembers but pulls the tool"
+    )
 
 
 def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
@@ -514,6 +520,8 @@ the sum of their squared errors, and the largest number of wavelets"""
 class _Compared:
     """Rows on which a memory is compared with the model without it, and the errors of the latter."""
 
+    balance: Float1D
+    """(n,) 1 for a row that moves; rows that wait count together at most as much"""
     weight: Float1D
     """(n,) weight in the fit without memory, times that of rows that wait"""
     sure: Float1D
@@ -531,7 +539,8 @@ class _Compared:
         force, position = (
             recorded.fitted([getattr(part, name) for part in parts]) for name in ("force", "position")
         )
-        moving = recorded.fitted([roles_of(part) == Role.MOVING for part in parts])
+        moving = recorded.fitted(recorded.moving)
+        balance = balanced(moving)
         if "velocity" in found.inputs:
             derived = [velocity(part) for part in parts]
             speed, known = (recorded.fitted(list(each)) for each in zip(*derived, strict=True))
@@ -539,19 +548,30 @@ class _Compared:
             residual = force - found.force(np.column_stack([position, speed]), None)
         elif found.residual is None or found.share is None or len(found.residual) != ends[-1]:
             # some rows have no residual, such as those at gaps of time
-            return cls(np.array(1.0), np.array(1.0), found.rmse_of_all, found.settled_rmse)
+            whole = np.array(1.0)
+            return cls(balance, whole, whole, found.rmse_of_all, found.settled_rmse)
         else:
             residual, share = (
                 recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
             )
             strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
             outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
-        share = share * balanced(moving)
+        share = share * balance
         sure = share * (moving | (outside != 0.0)) * (np.abs(force) > recorded.near_zero)
-        return cls(share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure))
+        return cls(
+            balance, share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure)
+        )
 
 
 def _rms(residual: Float1D, weight: NDArray[Any]) -> float:
     """Returns the RMS of residuals (n,) with weights (n,) or one weight; 0 without a weight above 0."""
     total = float(np.sum(np.broadcast_to(weight, residual.shape)))
     return float(np.sqrt(np.sum(weight * residual**2) / total)) if total else 0.0
+
+
+def balanced(moving: NDArray[np.bool_]) -> Float1D:
+    """Returns the weight of each row (n,): 1 while the tool moves. Rows that wait count together at most as
+    much as these, because their number only shows how long the tool waited."""
+    moves = int(np.count_nonzero(moving))
+    waits = len(moving) - moves
+    return np.where(moving, 1.0, min(1.0, moves / waits) if moves and waits else 1.0)

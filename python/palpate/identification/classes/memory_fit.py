@@ -62,8 +62,6 @@ class Motion:
     force: Float1D
     touched: NDArray[np.bool_]
     """(n,) True for the rows that are fitted: without contact the force is zero in any state of the object"""
-    moving: NDArray[np.bool_]
-    """(n,) True for the rows at which the tool moves; the others wait"""
 
 
 @dataclass(frozen=True)
@@ -195,22 +193,18 @@ class MemoryFit:
         self.motions, self.least = motions, least
         columns = resting(np.concatenate([m.position[m.touched] for m in motions]))
         self._force = np.concatenate([m.force[m.touched] for m in motions])
-        moving = np.concatenate([m.moving[m.touched] for m in motions])
-        self.weight = balanced(moving)
-        self._root = np.sqrt(self.weight)[:, None]
-        self.n_rows = float(self.weight.sum())
+        self.n_rows = len(self._force)
         bends = (
             np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
         )
         bends *= min(MOST_ROUGHNESS, ROUGHNESS_SHARE * rms) * np.sqrt(self.n_rows / len(bends))
-        self._resting = np.concatenate([self._root * columns, bends])
+        self._resting = np.concatenate([columns, bends])
         self._space = np.linalg.qr(self._resting)[0]
         self._target = self._free(self._force[:, None])[:, 0]
 
     def _padded(self, columns: Float2D) -> Float2D:
-        """Returns weighted columns (n, m) with zeros in the rows of the curvature."""
-        zeros = np.zeros((len(self._resting) - len(columns), columns.shape[1]))
-        return np.concatenate([self._root * columns, zeros])
+        """Returns columns (n, m) with zeros in the rows of the curvature."""
+        return np.concatenate([columns, np.zeros((len(self._resting) - len(columns), columns.shape[1]))])
 
     def _free(self, columns: Float2D) -> Float2D:
         """Returns columns without the part that the force at rest can fit."""
@@ -236,8 +230,8 @@ class MemoryFit:
         return np.concatenate(parts)
 
     def residual(self, shape: Shape) -> Float1D:
-        """Returns the weighted force minus fitted force at the rows, then the weighted curvature of the
-        fitted force at rest."""
+        """Returns force minus fitted force at the rows, then the weighted curvature of the fitted force
+        at rest."""
         free = self._free(self.columns(shape))
         return self._target - free @ _nonnegative(free, self._target)
 
@@ -278,18 +272,13 @@ class MemoryFit:
 
     def error(self, shape: Shape | None) -> Float1D:
         """Returns force minus fitted force at the rows; without branches for None."""
-        residual = self._target if shape is None else self.residual(shape)
-        return np.asarray(residual[: len(self._force)] / self._root[:, 0])
-
-    def rms(self, shape: Shape | None) -> float:
-        """Returns the weighted RMS of the error, without the weighted curvature."""
-        return float(np.sqrt(np.average(self.error(shape) ** 2, weights=self.weight)))
+        return (self._target if shape is None else self.residual(shape))[: self.n_rows]
 
     def independent(self, shape: Shape | None) -> float:
         """Returns the number of independent rows of a residual; that without branches for None."""
         residual = self.error(shape)
         rho = max(0.0, neighbour_correlation(residual))
-        return max(LEAST_INDEPENDENT, independent_share(rho) * self.n_rows)
+        return max(LEAST_INDEPENDENT, independent_share(rho) * len(residual))
 
     def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
         """Returns the criterion of a memory."""
@@ -297,25 +286,25 @@ class MemoryFit:
         p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
         return deviance(criterion, rows * mean, rows, p)
 
-    def held_out_errors(self, shape: Shape) -> Float1D:
-        """Returns the mean squared error on each held-out fifth of the sections, fitted without it.
+    def held_out_errors(self, shape: Shape, weight: Float1D) -> Float1D:
+        """Returns the mean squared error, with the weights (n,) of the rows, on each held-out fifth of the
+        sections, fitted without it.
 
         Coefficients that the other sections do not determine keep their values: in a relaxation test each
         position is visited once.
         """
-        n = len(self._force)
-        columns = np.concatenate([self._resting[:n], self._root * self.columns(shape)], axis=1)
+        columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
         columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
         section = np.concatenate(
             [(np.arange(len(m.time)) // SECTION_ROWS % HELD_OUT_EVERY)[m.touched] for m in self.motions]
         )
-        residual = self.residual(shape)[:n]
+        residual = self.error(shape)
         errors = []
         for fold in np.unique(section):
             out = section == fold
             change = np.linalg.lstsq(columns[~out], residual[~out], rcond=UNDETERMINED)[0]
-            squares = float(np.sum((residual[out] - columns[out] @ change) ** 2))
-            errors.append(squares / float(self.weight[out].sum()))
+            squares = (residual[out] - columns[out] @ change) ** 2
+            errors.append(float(np.average(squares, weights=weight[out])))
         return np.array(errors)
 
 
@@ -326,11 +315,3 @@ def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
     size = np.linalg.norm(table, axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(scipy.optimize.nnls(table / size, right)[0] / size)
-
-
-def balanced(moving: NDArray[np.bool_]) -> Float1D:
-    """Returns the weight of each row (n,): 1 while the tool moves. Rows that wait count together at most as
-    much as these, because their number only shows how long the tool waited."""
-    moves = int(np.count_nonzero(moving))
-    waits = len(moving) - moves
-    return np.where(moving, 1.0, min(1.0, moves / waits) if moves and waits else 1.0)
