@@ -208,7 +208,7 @@ def test_a_device_that_no_realistic_rate_helps_gets_a_bound_and_a_scale_instead_
         assert plan(scaled, weak, energy_account=False).verdict.level == level
 
 
-def test_a_steep_fall_is_stated_with_its_own_place() -> None:
+def test_a_steep_fall_is_stated_with_the_place_of_the_fall() -> None:
     """A pull that ends near 3 mm is steeper than the rise at the start of the travel."""
     weak = DeviceProfile.load(example_profiles()["phantom-premium-1.0"][0])
     model = keyswitch_by_hand(weight=[-4.0], beta=[[0.0028]], linear=[-8000.0], below="linear")

@@ -129,7 +129,7 @@ def test_a_mass_on_a_scale_is_the_force_that_is_its_weight(name: str) -> None:
     assert choice.notes == (f"{name} is read in {unit.symbol}",)
 
 
-def test_a_mass_of_another_quantity_or_next_to_a_force_is_no_force() -> None:
+def test_a_mass_of_another_quantity_or_next_to_a_force_is_not_read() -> None:
     assert choose("x_mm,Vibration [g],Kraft (N)").force.name == "Kraft (N)"
     with pytest.raises(InputError, match="needs two columns of numbers"):
         choose("x_mm,Acceleration [g]")

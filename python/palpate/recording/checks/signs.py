@@ -64,13 +64,13 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
     parts = min(max(len(x) // LEAST_ROWS_PER_CELL, 3), MOST_CELLS)
     part = np.minimum((parts * ((x - checked.lower) / checked.travel)).astype(np.intp), parts - 1)
     rows = np.bincount(part, minlength=parts)
-    mean = np.bincount(part, (f - f.min()) / np.ptp(f), parts)[rows > 0] / rows[rows > 0]
-    changes = np.diff(mean)
-    felt = np.abs(changes) > FORCE_FLOOR
+    curve = np.bincount(part, (f - f.min()) / np.ptp(f), parts)[rows > 0] / rows[rows > 0]
+    changes = np.diff(curve)
+    noticed = np.abs(changes) > FORCE_FLOOR
     # A force that lets go falls once, and rises over most of the travel.
-    if not np.ptp(mean) > 0.0 or np.sign(changes[felt]).sum() >= 0.0:
+    if not np.ptp(curve) > 0.0 or np.sign(changes[noticed]).sum() >= 0.0:
         return []
-    correlation = float(np.corrcoef(np.flatnonzero(rows), mean)[0, 1])
+    correlation = float(np.corrcoef(np.flatnonzero(rows), curve)[0, 1])
     return [usable(sentence) for sentence in mirror_notes(correlation)]
 
 
