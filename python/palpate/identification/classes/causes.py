@@ -179,7 +179,8 @@ class _Strokes:
         data = self.best.data
         x = data.path[:, 0]
         low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
-        again = ((low <= x[self.rows]) & (x[self.rows] <= high)).astype(float)
+        place = np.floor(x[self.rows] * PLACES)  # wholly within the earlier strokes, or not
+        again = ((low * PLACES <= place) & (place + 1.0 <= high * PLACES)).astype(float)
         yield FIRST, again, 1.0, [again]
         if data.parts:
             velocity, known = at_rows(data.parts, least_error_low_pass(data.parts, order=1), 1, len(x))
@@ -202,7 +203,7 @@ class _Strokes:
 
 
 def cause_of(best: Judged) -> Cause | None:
-    """Returns the cause of what differs between strokes over the same place; None if nothing can differ.
+    """Returns the cause of what differs between strokes over the same place; None if no cause lowers BIC.
 
     Causes that a hand notices are preferred. The one with the least BIC is taken, or an earlier one of the
     list if its BIC is higher by less than the evidence for a model class: two strokes show the same for most
@@ -253,4 +254,6 @@ def cause_of(best: Judged) -> Cause | None:
         found.append((criterion, Cause(text, sentence == FASTER, 1.0 - rss / before, noticed)))
     found = [each for each in found if each[1].noticed > 1.0] or found
     least = min(criterion for criterion, _ in found)
+    if least >= deviance("bic", before, n, 0):
+        return None
     return next(cause for criterion, cause in found if criterion <= least + SearchOptions.evidence)
