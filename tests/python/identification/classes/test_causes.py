@@ -69,7 +69,7 @@ def test_a_mass_that_is_not_tested_has_a_limit() -> None:
     assert float(mass) == pytest.approx(0.01 / 39.5, rel=0.05)
 
 
-def test_noise_of_the_position_at_the_first_turn_is_no_first_press() -> None:
+def test_noise_of_the_position_at_a_turn_is_not_called_a_first_press() -> None:
     """A later stroke reaches beyond the first one in some rows of the last place."""
     random, time = np.random.default_rng(5), 0.01 * np.arange(1000.0)
     x = np.abs((0.4 * time + 1.0) % 2.0 - 1.0)
