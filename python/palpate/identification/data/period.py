@@ -14,6 +14,7 @@ from ...recording import Recording
 from ...recording.conversion import MIN_ROWS
 from ...recording.motion import directions_of
 from .limits import standard_deviation
+from .strokes import turns_before
 
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
@@ -60,13 +61,20 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
         return _squared_error(box, share, way, period, cells)
 
     (wave, count), orders = repeat, np.arange(1, HARMONICS + 1)
-    wave = _fitted(box, share, way, wave, orders, cells)
-    allowed = squared_error(count * wave) / (1.0 - LEAST_SHARE)
+    wave, weight = _fitted(box, share, way, wave, orders, cells)
+    # Friction that reverses at the same turns of each cycle looks like a longer period.
+    settled = _settled(way, weight > 0.0)
+    box, share, way = box[settled], share[settled], way[settled]
+    # Rounded positions shift the force of each row; where the rounding repeats, so does its error.
+    curve = _curve(np.mod(box / wave, 1.0), share, max(round(cells * wave), 1))
+    step = cells * float(np.median(np.diff(np.unique(box))))
+    rounding = step**2 / 12.0 * float(np.mean(np.diff(curve) ** 2))
+    allowed = max(squared_error(count * wave), rounding) / (1.0 - LEAST_SHARE)
     divisors = (each for each in range(1, count + 1) if count % each == 0)
     waves = next(each for each in divisors if squared_error(each * wave) <= allowed)
     period = waves * wave
     if waves > 1:
-        period = _fitted(box, share, way, period, np.append(waves * orders, orders), cells)
+        period, _ = _fitted(box, share, way, period, np.append(waves * orders, orders), cells)
     if (revolution := revolution_of(recordings)) is not None:
         # The force repeats after a revolution, of which its period is exactly a part.
         part = revolution / travel / max(round(revolution / travel / period), 1)
@@ -128,8 +136,9 @@ def _squared_error(box: Float1D, force: Float1D, way: Float1D, period: float, ce
 
 def _fitted(
     box: Float1D, force: Float1D, way: Float1D, period: float, orders: NDArray[np.intp], cells: int
-) -> float:
-    """Returns the period [travel] with which harmonics fit the force best, a sum for each direction.
+) -> tuple[float, Float1D]:
+    """Returns the period [travel] with which harmonics fit the force best, a sum for each direction, and the
+    weight of each row (n,), 0 to 1.
 
     Gauss-Newton steps of the period, with the amplitudes eliminated (Golub & Pereyra 1973, in Kaufman's
     form). Each step adds an order, because a higher one needs a more precise period. Tukey's biweight leaves
@@ -158,7 +167,15 @@ def _fitted(
         period += float(np.clip(change, -bound, bound))
         scale = max(BIWEIGHT * standard_deviation(residual), tiny)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
-    return period
+    return period, weight
+
+
+def _settled(way: Float1D, fitted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Returns False (n,) for the rows between a turn and the first fitted row behind it."""
+    row, stroke, _ = turns_before(way)
+    first = np.full(stroke[-1] + 1, len(way))
+    np.minimum.at(first, stroke, np.where(fitted, row, len(way)))
+    return np.asarray(row >= first[stroke])
 
 
 def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:

@@ -10,6 +10,7 @@ import palpate
 from conftest import sampled
 from imperfect import Array, knob, press_and_release
 from palpate import Recording
+from palpate._core.model import play
 from palpate.identification.data.period import period_of, revolution_of
 from palpate.identification.data.rows import period_notes
 
@@ -59,6 +60,25 @@ def test_friction_that_reverses_and_wrong_readings_do_not_shift_the_period(trave
     torque = knob(angle) + 2.5 * side + random.normal(0.0, 0.02, 800)
     torque[random.choice(800, wrong, replace=False)] += 40.0
     assert period_of([Recording.from_arrays(angle, torque)]) == pytest.approx(15.0, rel=3e-5)
+
+
+def detents_of_motor(angle: Array, friction: float) -> Recording:
+    """Returns two cycles of a motor with 84 waves a turn; its friction reverses over half a degree."""
+    state = (angle - play(angle, 0.25, start=0.0)) / 0.25
+    wave, noise = np.radians(84.0 * angle), np.random.default_rng(0).normal(0.0, 0.004, len(angle))
+    torque = np.sin(wave + 1.0) + 0.2 * np.sin(2.0 * wave) + friction * state + noise
+    return Recording.from_arrays(np.round(angle / 0.045) * 0.045, torque)
+
+
+def test_friction_that_reverses_at_the_same_turns_does_not_give_a_longer_period() -> None:
+    way = np.abs((np.arange(6122) / 1530.7 + 1.0) % 2.0 - 1.0)
+    angle = 189.0 * np.interp(way, [0.0, 0.015, 0.985, 1.0], [0.0, 0.003, 0.997, 1.0])
+    assert period_of([detents_of_motor(angle, 0.5)]) == pytest.approx(360.0 / 84.0, rel=1e-4)
+
+
+def test_rounded_positions_that_repeat_do_not_give_a_longer_period() -> None:
+    angle = np.tile(press_and_release(2901, 378.0), 2)
+    assert period_of([detents_of_motor(angle, 0.3)]) == pytest.approx(360.0 / 84.0, rel=1e-4)
 
 
 def spring(x: Array) -> Array:
