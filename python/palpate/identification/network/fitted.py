@@ -142,12 +142,13 @@ class FittedNetwork:
         }
 
     def force_model(self) -> ForceModel:
-        """Returns the force law; it is periodic if it has harmonics."""
+        """Returns the force law over the domain; it is periodic if it has harmonics. A memory also depends on
+        the motion outside the domain."""
         period = float(self.upper[0] - self.lower[0]) if self.harmonics else None
-        memory = None if self.memory is None else self.memory.memory()
-        return ForceModel(
-            **self.parameters(), below=self.below, above=self.above, period=period, memory=memory
-        )
+        law = self.parameters()
+        if self.memory is not None:
+            law |= {"below": self.below, "above": self.above, "memory": self.memory.memory()}
+        return ForceModel(**law, period=period)
 
     def fit(self) -> Fit:
         """Returns the model class and the tested networks, in the form of a model file."""
