@@ -18,6 +18,7 @@ from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution
 from ..search.evidence import Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
+from .repeatability import left_out_residual
 
 DISTANCES = 2.0 ** np.arange(-10.0, -4.0, 0.5)
 """Distances between press and release that are tried [travel]: from those of measured domes to one beyond
@@ -52,7 +53,8 @@ def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     Backlash of a distance d between the position sensor and the object shows the force of the object at
     x - s d/2, with the direction s; a force that is late by t shows that at x(time - t). Where the force
     rises, the press is then below the release, which a passive object excludes. If a hysteresis of any sign
-    lowers BIC as much as a model class must, the wavelets of the model are refined on moved rows.
+    lowers BIC as much as a model class must, and the squared error by more than the force between rows adds
+    to it, the wavelets of the model are refined on moved rows.
     """
     if selection.shifted is None or selection.shifted[0] is not best:
         selection.shifted = best, _shift_of(selection, best)
@@ -94,6 +96,10 @@ def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     constrained = criterion_of(unmoved.problem, unmoved.solution, "bic")
     if criterion_of(problem, free, "bic") + options.search.evidence > constrained:
         return None
+    explained = unmoved.rmse**2 - problem.rmse(free) ** 2
+    between = replace(best.error, residual=left_out_residual(selection))
+    if explained < between.rmse**2 - best.error.rmse**2:
+        return None  # rows that are far apart explain as much
     amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]
     near, late = min(amounts, key=lambda each: at(moved(*each)).rmse)
     amount = 2.0 ** float(
@@ -105,6 +111,6 @@ def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
         ).x
     )
     without = at(moved(amount, late))
-    if unmoved.rmse**2 - without.rmse**2 < 0.5 * (unmoved.rmse**2 - problem.rmse(free) ** 2):
+    if unmoved.rmse**2 - without.rmse**2 < 0.5 * explained:
         return None
     return Shift(amount, late, unmoved.rmse, without)

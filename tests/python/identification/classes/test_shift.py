@@ -107,3 +107,15 @@ def test_a_lag_that_leaves_most_of_the_error_has_no_number() -> None:
     (reason,) = (each for each in model.verdict.reasons if "shifted against each other" in each)
     assert "by a late force" in reason
     assert "give --force-late-s SECONDS" in reason
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_rows_that_are_far_apart_do_not_look_like_shifted_strokes(seed: int) -> None:
+    """A trigger with a stop is moved by hand in 40 steps, without backlash."""
+    x = np.round(np.linspace(0.0, 7.6, 40), 2)
+    path, side = np.r_[x, x[-2::-1]], np.r_[np.ones(40), -np.ones(39)]
+    force = 0.9 + 0.11 * path + 0.12 * side + 22.0 * np.maximum(path - 7.2, 0.0)
+    force += np.random.default_rng(seed).normal(0.0, 0.01, len(path))
+    model = palpate.identify(path, 9.80665e-3 * np.round(force / 9.80665e-3))
+    assert model.notes["shift_nrmse"] == 0.0
+    assert "record more rows per stroke" in str(model.verdict)
