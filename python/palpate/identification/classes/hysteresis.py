@@ -85,7 +85,8 @@ class Hysteresis(ModelClass):
             return self._chosen(below, self._free(below, HysteresisInput.of_strokes(data.side)))
         play = PlaySearch(selection.samples, selection.options)
         found = [self._free(below, strokes, play) for strokes in play.starts]
-        if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()) and not play.given:
+        order_known = data.order is not None and {-1.0, 1.0} <= set(data.order.tolist())
+        if data.order is not None and order_known and not (self._named and play.is_given):
             # The direction can also change at once at a turn, or in another way than that of a play.
             order = self._free(below, HysteresisInput(data.order, data.order != 0.0))
             found = [order, *filter(play.has_minimum, found)]
@@ -285,15 +286,16 @@ class PlaySearch:
         return self._usable[1:-1] or self._usable
 
     @property
-    def given(self) -> bool:
-        """True if the options state one or two play radii, and one of them is taken."""
+    def is_given(self) -> bool:
+        """True if the options state a usable play radius, or two, in place of bounds of a search."""
         return bool(self._usable) and len(self._radii) < 3
 
     def has_minimum(self, candidate: Candidate) -> bool:
-        """True if the play radius of a candidate is not at a bound of the search."""
+        """True if the play radius of a candidate is given or not at a bound of the search."""
         least, most = self._bounds
         radius = candidate.play_radius or 0.0
-        return (1.0 + RADIUS_TOLERANCE) * least < radius < (1.0 - RADIUS_TOLERANCE) * most
+        inside = (1.0 + RADIUS_TOLERANCE) * least < radius < (1.0 - RADIUS_TOLERANCE) * most
+        return inside or self.is_given
 
     @property
     def _bounds(self) -> tuple[float, float]:
