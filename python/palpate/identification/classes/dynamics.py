@@ -148,8 +148,10 @@ def spread_of_speeds(velocity: Float1D) -> float:
     """
     spreads = [0.0]
     for speed in (velocity[velocity > 0.0], -velocity[velocity < 0.0]):
-        first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
-        spreads.append(math.sqrt(max(third * first / second**2 - 1.0, 0.0)) if second > 0.0 else 0.0)
+        if len(speed):
+            share = speed / speed.max()
+            first, second, third = (float(np.sum(share**power)) for power in (1, 2, 3))
+            spreads.append(math.sqrt(max(third * first / second**2 - 1.0, 0.0)))
     return max(spreads)
 
 
