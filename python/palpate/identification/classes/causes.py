@@ -185,8 +185,11 @@ class _Strokes:
         if data.parts:
             velocity, known = at_rows(data.parts, least_error_low_pass(data.parts, order=1), 1, len(x))
             time = np.concatenate([piece.row_time for piece in data.parts])
-            lasting = np.maximum(time[self.end] - time[self.begin], TINY)
-            mean = (x[self.end] - x[self.begin]) * float(data.reach[0]) / lasting
+            distance, lasting = (
+                (x[self.end] - x[self.begin]) * data.reach[0],
+                time[self.end] - time[self.begin],
+            )
+            mean = np.divide(distance, lasting, out=np.zeros(len(lasting)), where=lasting > 0.0)
             moving = np.where(known[self.rows], velocity[self.rows], mean)
             if spread_of_speeds(moving) >= LEAST_SPEED_SPREAD:
                 speed = np.abs(moving)
