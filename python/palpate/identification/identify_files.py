@@ -210,10 +210,12 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
             position, force = block.position[~wrong], block.force[~wrong]
             require_in_range("position", position)
             require_in_range("force", force)
-            direction = block.direction
-            side = strokes_from_order(position) if direction is None else direction[~wrong]
-            if direction is None and (waiting := waits(position)) is not None:
-                side = np.where(waiting, 0, side)
+            if block.direction is None:
+                side, waiting = strokes_from_order(position), waits(position)
+                if side is not None and waiting is not None:
+                    side = np.where(waiting, 0, side)
+            else:
+                side = block.direction[~wrong]
             summary = summarise(position, force, side)
             if wrong.any():
                 first = int(np.flatnonzero(block.kept)[wrong][0])
