@@ -248,7 +248,7 @@ class Recording:
     @cached_property
     def motion(self) -> Motion:
         """Positions and times of all rows of the motion, including the rows that were held out."""
-        if self.part_of is not None and len(self.part_of.rows) == len(self):
+        if self.part_of is not None:
             return self.part_of
         return Motion(self.position, self.time, np.arange(len(self)))
 
@@ -301,6 +301,7 @@ class Recording:
             inputs=self.inputs[rows],
             columns={name: cells[rows] for name, cells in self.columns.items()},
             source=replace(self.source, rows=int(np.count_nonzero(rows))),
+            part_of=None if self.part_of is None else replace(self.part_of, rows=self.part_of.rows[rows]),
         )
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:

@@ -144,6 +144,14 @@ def test_split_holds_out_the_last_of_every_k_rows(every: int) -> None:
     assert (train.source.held_out, test.source.held_out) == (False, True)
 
 
+def test_rows_that_are_dropped_from_held_out_rows_leave_their_motion() -> None:
+    position = np.linspace(0.0, 1.0, 20)
+    _, held = Recording.from_arrays(position, position).split(5)
+    left = held.without(np.array([False, True, False, False]))
+    assert np.array_equal(left.motion.position, position)
+    assert left.motion.rows.tolist() == [4, 14, 19]
+
+
 @pytest.mark.parametrize("every", [1, 0, -3, N + 1])
 def test_a_split_that_holds_out_no_row_or_every_row_is_refused(every: int) -> None:
     with pytest.raises(InputError, match=f"every is {every};"):
