@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..frames import pd
 from ..html_table import Curve, html_table
 from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text, reversal_findings
+from ..identification.classes.memory import balanced
 from ..identification.data.rows import require_in_range
 from ..identification.data.strokes import weights_of_shared_errors
 from ..identification.options import SearchOptions
@@ -27,7 +28,7 @@ from ..recording.checks import quality_findings
 from ..recording.files import free_name
 from ..recording.motion import ordered_strokes
 from ..recording.reading import RecordingLike, recording_from
-from ..recording.roles import Informative
+from ..recording.roles import Informative, Role, roles_of
 from ..recording.units import COLUMN_SUFFIX, Unit
 from ..verdict import GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
@@ -133,7 +134,7 @@ class Verification:
     @property
     def judged_strokes(self) -> tuple[Stroke, ...]:
         """The same without the rows behind turns that share an error"""
-        return self._strokes(self.weight > MOST_SHARED)
+        return self.strokes if self.prediction.side is None else self._strokes(self.weight > MOST_SHARED)
 
     def _strokes(self, kept: NDArray[np.bool_]) -> tuple[Stroke, ...]:
         recording, rows = self.recording, np.flatnonzero(self.rows)[kept]
@@ -299,16 +300,19 @@ def _compared(
     informative = Informative([recording], float(model.lower[0]))
     (kept,) = informative.recordings
     found = predict(model, kept, play_radius=play_radius)
-    weight = _weights(kept, found)
+    weight = _weights(model, kept, found)
     rows = np.zeros(len(recording), dtype=bool)
     rows[informative.kept[0][found.rows]] = True
     without_motion = found.without_motion + len(recording) - len(kept)
     return informative, replace(found, rows=rows, without_motion=without_motion), weight
 
 
-def _weights(recording: Recording, found: Prediction) -> Float1D:
+def _weights(model: Model, recording: Recording, found: Prediction) -> Float1D:
     """Returns the weights (k,) of the evaluated rows: rows behind turns share an error if the direction of
-    the model changes at once there. A play operator states how friction reverses: all rows count whole."""
+    the model changes at once there. A play operator states how friction reverses: all rows count whole. With
+    a memory, rows that wait count at most as much as motion."""
+    if model.memory is not None:
+        return balanced((roles_of(recording) == Role.MOVING)[found.rows])
     rows, order = found.rows, ordered_strokes(recording)
     if found.side is None or order is None or not (np.abs(found.side) == 1.0).all():
         return np.ones(len(found.force))

@@ -139,7 +139,7 @@ def test_identify_and_verify_print_one_error(folder: Path, capsys: pytest.Captur
     for command in (["identify", "f.csv", "-o", "f.json"], ["verify", "f.json", "f.csv"]):
         main(command)
         printed = " ".join(capsys.readouterr().out.split())
-        found = re.search(r"NRMSE (\S+) on .*?, (\S+) if rows behind turns, where friction", printed)
+        found = re.search(r"NRMSE (\S+) on .*?, (\S+) if rows that wait or in which", printed)
         assert found is not None
         errors.append([float(each) for each in found.groups()])
     np.testing.assert_allclose(*errors, rtol=1e-3)

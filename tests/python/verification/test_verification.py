@@ -633,7 +633,7 @@ def test_the_error_of_rows_behind_turns_is_named() -> None:
     assert found.settled_nrmse < 0.02 < 0.1 < found.nrmse
     statement = found.summary()["error"]
     assert f"NRMSE {found.nrmse:.4g} on {found.n} rows" in statement
-    assert f"{found.settled_nrmse:.4g} if rows behind turns" in statement
+    assert f"{found.settled_nrmse:.4g} if rows that wait or in which friction reverses" in statement
     assert "just noticeable differences" in found.summary()["felt"]
     assert "behind turns" not in verify(model_of(stroke().source), curve()).summary()["error"]
 

@@ -56,7 +56,7 @@ def error_text(nrmse: float, settled: float, rows: str) -> str:
     verdict uses if it differs."""
     text = f"NRMSE {nrmse:.4g} on {rows}"
     if f"{settled:.2g}" != f"{nrmse:.2g}":
-        text += f", {settled:.4g} if rows behind turns, where friction reverses, share one error"
+        text += f", {settled:.4g} if rows that wait or in which friction reverses share one error"
     return text
 
 

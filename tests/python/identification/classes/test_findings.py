@@ -288,7 +288,7 @@ def test_strokes_shifted_by_backlash_are_not_only_called_late(timed: bool, cure:
 def test_measured_relaxation_is_named(stretch: str) -> None:
     """Most rows wait: they are not fitted, and the model is not good for them."""
     recording = palpate.read_recording(DATA / "vhb4910_viscoelastic" / f"relax_stretch_{stretch}.csv")
-    assert palpate.identify(recording).fit.nrmse < 0.05
+    assert palpate.verify(palpate.identify(recording), recording).nrmse < 0.05
     model = palpate.identify(recording, inputs=("position",))
     waits = model.notes["roles"]["wait in contact"]
     assert waits > 0.8 * len(recording)

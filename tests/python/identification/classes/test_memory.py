@@ -405,6 +405,8 @@ def test_a_mirrored_pad_gets_the_error_of_the_model_that_is_returned() -> None:
     spread = np.sqrt(np.average((force - np.average(force, weights=weight)) ** 2, weights=weight))
     error = np.sqrt(np.average((found + force) ** 2, weights=weight)) / spread
     assert model.fit.nrmse == pytest.approx(error, rel=0.02)
+    verified = palpate.verify(model, Recording.from_arrays(-x, -force, time))
+    assert verified.settled_nrmse == pytest.approx(error, rel=0.02)
 
 
 @pytest.mark.full
