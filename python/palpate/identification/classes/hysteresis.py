@@ -5,9 +5,8 @@ a play operator."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 import scipy
@@ -83,35 +82,38 @@ class Hysteresis(ModelClass):
         selection, data = self._selection, self._selection.data
         if data.side is not None:
             return self._chosen(below, self._free(below, HysteresisInput.of_strokes(data.side)))
-        play = PlaySearch(selection.samples, selection.options)
-        found = [self._free(below, strokes, play) for strokes in play.starts]
-        order_known = data.order is not None and {-1.0, 1.0} <= set(data.order.tolist())
-        if data.order is not None and order_known and not (self._named and play.is_given):
+        play, order = PlaySearch(selection.samples, selection.options), []
+        plays = [self._free(below, strokes, play) for strokes in play.starts]
+        both_ways = data.order is not None and {-1.0, 1.0} <= set(data.order.tolist())
+        if data.order is not None and both_ways and not (self._named and play.is_given):
             # The direction can also change at once at a turn, or in another way than that of a play.
-            order = self._free(below, HysteresisInput(data.order, data.order != 0.0))
-            found = [order, *filter(play.has_minimum, found)]
-        if found:
-            return self._chosen(below, self._best(found))
+            order = [self._free(below, HysteresisInput(data.order, data.order != 0.0))]
+            plays = list(filter(play.has_minimum, plays))
+        plays.sort(key=lambda each: each.play_radius or 0.0)
+        if found := [*order, *([reduce(self._better_of, plays)] if plays else [])]:
+            return self._chosen(below, reduce(self._better_of, found))
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
         selection.log.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
-    def _best(self, candidates: Sequence[Candidate]) -> Candidate:
-        """Returns the candidate with the smallest criterion on the rows that all can use.
+    def _better_of(self, smaller: Candidate, larger: Candidate) -> Candidate:
+        """Returns the candidate with the larger play radius if it lowers the criterion as much as a model
+        class must, on the rows that both can use: it states a longer reversal. Else the other one.
 
-        Each row has its weight in the candidate that follows it best. A play radius must lower the criterion
-        as much as a model class, compared with the order of rows.
+        Rows behind turns count whole for two radii. Compared with the order of rows, which has radius 0, they
+        have their weight in the candidate that follows them better.
         """
         selection = self._selection
         name, evidence = on_fitted_rows(selection.judge.criterion), selection.options.search.evidence
-        weights = np.array([each.fit_weight for each in candidates])
-        weight = weights.max(axis=0) * (weights > 0.0).all(axis=0)
-        return min(
-            candidates,
-            key=lambda each: each.on_rows(name, weight) + evidence * (each.play_radius is not None),
-        )
+        share = np.array([smaller.share, larger.share])
+        weight = 1.0 if smaller.play_radius else share.max(axis=0)
+        rows = weight * (share > 0.0).all(axis=0)
+        if selection.data.weight is not None:
+            rows = rows * selection.data.weight
+        falls = smaller.on_rows(name, rows) - larger.on_rows(name, rows)
+        return larger if falls >= evidence else smaller
 
     def _free(
         self,
