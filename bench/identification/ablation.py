@@ -171,6 +171,10 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
+def _moves(path: Any, order: Any, distance: float) -> Any:
+    return order != 0.0
+
+
 def _whole(path: Any, *_: Any) -> Any:
     return np.ones(len(path))
 
@@ -257,6 +261,9 @@ RULES = (
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
+    Rule("radius of strokes without reversals", f"{CLASSES}.hysteresis", "settled_rows", _moves),
+    Rule("reversals end after 12 %, not 24 %", f"{CLASSES}.hysteresis", "REVERSAL", 0.24),
+    Rule("largest radius needs turns apart", f"{CLASSES}.hysteresis", "PlaySearch._turns_apart", _one),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),
     Rule("missing play radius", f"{CLASSES}.findings", "radius_that_follows", _nothing),

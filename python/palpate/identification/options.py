@@ -60,9 +60,9 @@ class SearchOptions:
     max_positions: int = 1024
     """Largest number of distinct positions with one input; twice as many with two inputs, 64 times as many
     with three or more. More positions are gathered in about this number of cells [-]"""
-    play_radius: tuple[float, ...] = (0.0003, 0.001, 0.003, 0.03, 0.06)
-    """Play radii tried for hysteresis if the rows are in recorded order. The smallest and the largest of
-    three or more bound the search, and each other one is a start of it [share of the travel]"""
+    play_radius: tuple[float, ...] = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.06)
+    """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
+    smallest and the largest, of three or more, is searched [share of the travel]"""
     contact_share: float = 0.02
     """Largest |force| at the lower end of the domain, as a share of the force range, at which the tool leaves
     the object there: continuation "free" below the domain; at least the RMS error [-]"""

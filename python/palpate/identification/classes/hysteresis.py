@@ -6,18 +6,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property, reduce
+from functools import cached_property
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._typing import Float1D
 from ...errors import InputError
 from ...verdict import usable
 from ..data.limits import evenly_spread
 from ..data.strokes import (
     LEAST_KNOWN_SHARE,
     HysteresisInput,
+    settled_rows,
+    turns_before,
     weights_of_shared_errors,
 )
 from ..log import Decision, causes_of_crossing
@@ -45,6 +48,10 @@ RADIUS_TOLERANCE = 1e-3
 RADIUS_SEARCH_RATIO = 2.0
 """A search tries play radii between the best radius so far divided by this ratio and that radius times this
 ratio [-]."""
+
+REVERSAL = 0.12
+"""Distance from a turn up to which no row is fitted by the wavelets that show the play radius [travel]: the
+friction of the largest radius reverses in it. With twice this distance, few rows are left."""
 
 REWEIGHTINGS = 5
 """Number of fits of given wavelets, each with the weights that follow from the fit before."""
@@ -82,54 +89,56 @@ class Hysteresis(ModelClass):
         selection, data = self._selection, self._selection.data
         if data.side is not None:
             return self._chosen(below, self._free(below, HysteresisInput.of_strokes(data.side)))
-        play, order = PlaySearch(selection.samples, selection.options), []
-        plays = [self._free(below, strokes, play) for strokes in play.starts]
-        both_ways = data.order is not None and {-1.0, 1.0} <= set(data.order.tolist())
-        if data.order is not None and both_ways and not (self._named and play.is_given):
-            # The direction can also change at once at a turn, or in another way than that of a play.
-            order = [self._free(below, HysteresisInput(data.order, data.order != 0.0))]
-            plays = list(filter(play.has_minimum, plays))
-        plays.sort(key=lambda each: each.play_radius or 0.0)
-        if found := [*order, *([reduce(self._better_of, plays)] if plays else [])]:
-            return self._chosen(below, reduce(self._better_of, found))
+        play, basis, best = PlaySearch(selection.samples, selection.options), below.solution.basis, None
+        if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
+            # The direction can also change at once at a turn. Wavelets of strokes without their reversals
+            # show the radius; those of all rows would fit the reversals.
+            order = self._weighted(HysteresisInput(data.order, data.order != 0.0), basis)
+            best, settled = self._free(below, order), play.settled(order)
+            if settled.both_ways:
+                basis = self._free(below, settled).solution.basis
+        for strokes in play.best_of_options(basis):
+            found = self._free(below, strokes, play, first=basis)
+            best = found if best is None or self._fits_better(found, best) else best
+        if best is not None:
+            return self._chosen(below, best)
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
         selection.log.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
-    def _better_of(self, smaller: Candidate, larger: Candidate) -> Candidate:
-        """Returns the candidate with the larger play radius if it lowers the criterion as much as a model
-        class must, on the rows that both can use: it states a longer reversal. Else the other one.
+    def _fits_better(self, one: Candidate, other: Candidate) -> bool:
+        """True if the criterion of the first of two candidates is smaller on the rows that both can use, with
+        their weights in the first one. A play radius must lower it as much as a model class, compared with
+        the order of rows."""
+        weight = one.error_on(one.data.weight).weight * (other.share > 0.0)
+        evidence = self._selection.options.search.evidence
+        name = on_fitted_rows(self._selection.judge.criterion)
 
-        Rows behind turns count whole for two radii. Compared with the order of rows, which has radius 0, they
-        have their weight in the candidate that follows them better.
-        """
-        selection = self._selection
-        name, evidence = on_fitted_rows(selection.judge.criterion), selection.options.search.evidence
-        share = np.array([smaller.share, larger.share])
-        weight = 1.0 if smaller.play_radius else share.max(axis=0)
-        rows = weight * (share > 0.0).all(axis=0)
-        if selection.data.weight is not None:
-            rows = rows * selection.data.weight
-        falls = smaller.on_rows(name, rows) - larger.on_rows(name, rows)
-        return larger if falls >= evidence else smaller
+        def value(candidate: Candidate) -> float:
+            assert candidate.strokes is not None
+            return candidate.on_rows(name, weight) + evidence * (candidate.strokes.play_radius is not None)
+
+        return value(one) < value(other)
 
     def _free(
         self,
         below: Candidate,
         strokes: HysteresisInput,
         play: PlaySearch | None = None,
+        first: Basis | None = None,
     ) -> Candidate:
         """Returns a network with hysteresis, without constraints, for given direction states, or for those of
         the best play radius if `play` searches it.
 
-        A hysteresis h >= 0 has a mean, which a fit with the wavelets of the simpler candidate already shows.
+        A hysteresis h >= 0 has a mean, which a fit with the wavelets `first`, by default those of the simpler
+        candidate, already shows.
         If the criterion does not decrease with these wavelets, and the options do not name hysteresis, no
         network with hysteresis is grown.
         """
         selection, judge = self._selection, self._selection.judge
-        first = below.solution.basis
+        first = below.solution.basis if first is None else first
         strokes = self._weighted(strokes, first)
         rows = selection.samples.rows(strokes)
         problem = selection.samples.problem(rows, strokes)
@@ -272,38 +281,39 @@ class PlaySearch:
         moving = np.maximum.accumulate(np.where(data.fitted, np.arange(len(data.force)), 0))
         # A tool that waits does not move the play: noise of its position would.
         self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
-        # Friction reverses over the same way no matter how many periods of the force the travel has.
-        travel = float(np.ptp(self._path))
-        self._radii = [travel * share for share in sorted(options.search.play_radius)]
-        self._evidence = options.search.evidence
+        self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    @cached_property
-    def starts(self) -> list[HysteresisInput]:
-        """Direction states of the rows for the play radii at which a search starts: those of the options, the
-        smallest first. The smallest and the largest of three or more only bound the search.
+    def settled(self, order: HysteresisInput) -> HysteresisInput:
+        """Returns the directions of the rows behind reversals."""
+        fitted = order.side * self._samples.data.fitted
+        return replace(order, known=settled_rows(self._path, fitted, REVERSAL))
 
-        Empty if the motions between gaps of time are too short for every play radius, or never reverse: with
-        one stroke only the sum g + h is determined.
+    def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
+        """Returns the direction states for each play radius of the options at which the error on given
+        wavelets is smaller than at its neighbours, and than that of the order of rows.
+
+        The error can fall further beyond the smallest and the largest of three or more radii. Where the order
+        of rows is known, the smallest is not returned, and the largest only if the tool turns at different
+        places: else wavelets there fit as much. Returns none if the motions between gaps of time are too
+        short for every play radius, or never reverse: with one stroke only the sum g + h is determined.
         """
-        return self._usable[1:-1] or self._usable
-
-    @property
-    def is_given(self) -> bool:
-        """True if the options state a usable play radius, or two, in place of bounds of a search."""
-        return bool(self._usable) and len(self._radii) < 3
-
-    def has_minimum(self, candidate: Candidate) -> bool:
-        """True if the play radius of a candidate is given or not at a bound of the search."""
-        least, most = self._bounds
-        radius = candidate.play_radius or 0.0
-        inside = (1.0 + RADIUS_TOLERANCE) * least < radius < (1.0 - RADIUS_TOLERANCE) * most
-        return inside or self.is_given
-
-    @property
-    def _bounds(self) -> tuple[float, float]:
-        """Smallest and largest play radius of the search [box]."""
-        least, most = (each.play_radius or 0.0 for each in (self._usable[0], self._usable[-1]))
-        return least, most
+        if not self._usable:
+            return []
+        known, order, least = self._thinned(self._usable[-1]), self._samples.data.order, math.inf
+        first = last = math.inf
+        if order is not None:
+            known &= order != 0.0
+            least = self._residual_squares(HysteresisInput(order, known), basis, known)
+            if len(self._usable) > 2:
+                first, last = 0.0, math.inf if self._turns_apart(order) else 0.0
+        errors = [first, *(self._residual_squares(each, basis, known) for each in self._usable), last]
+        return [
+            strokes
+            for strokes, before, error, after in zip(
+                self._usable, errors, errors[1:], errors[2:], strict=False
+            )
+            if error <= min(before, after) and error < least
+        ]
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """Returns the direction states for the best play radius near the given one, on given wavelets.
@@ -313,7 +323,7 @@ class PlaySearch:
         press and release, such as damping.
         """
         radius = strokes.play_radius or 0.0
-        least, most = self._bounds
+        least, most = (each.play_radius or 0.0 for each in (self._usable[0], self._usable[-1]))
         lower, upper = max(radius / RADIUS_SEARCH_RATIO, least), min(radius * RADIUS_SEARCH_RATIO, most)
         if lower >= upper:
             return strokes
@@ -327,13 +337,19 @@ class PlaySearch:
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
 
+    def _turns_apart(self, order: Float1D) -> bool:
+        """True if the tool, whose rows have the directions `order` (n,), turns at places that are further
+        apart than the way in which friction reverses."""
+        at = self._path[turns_before(order)[2][1:]]
+        return any(np.ptp(ends) > REVERSAL for ends in (at[::2], at[1::2]) if len(ends))
+
     def _of(self, radius: float) -> HysteresisInput:
         return HysteresisInput.of_play(np.split(self._path, self._starts[1:]), radius)
 
     @cached_property
     def _usable(self) -> list[HysteresisInput]:
-        """Direction states of the rows for each play radius of the options, the smallest first. Radii are
-        left out at which too few rows, or rows of one stroke only, have a known direction state."""
+        """Direction states of the rows for each tried play radius, the smallest radius first; without radii
+        at which too few rows, or rows of one stroke only, have a known direction state."""
         tried = [self._of(radius) for radius in self._radii]
         fitted = self._samples.data.fitted
         return [one for one in tried if one.known[fitted].mean() >= LEAST_KNOWN_SHARE and one.both_ways]

@@ -3,18 +3,18 @@
 
 import os
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from imperfect import Array, wandering
-from palpate import InputError, Model, SearchOptions, identify, verify
+from palpate import InputError, SearchOptions, identify, verify
 from palpate._core.model import play
 from palpate._typing import Int8Vector
 from palpate.identification.classes.hysteresis import PlaySearch
 from palpate.identification.data.rows import Rows
 from palpate.identification.data.strokes import HysteresisInput
+from palpate.identification.network.basis import Basis
 from palpate.identification.options import IdentifyOptions
 from palpate.identification.search.evidence import Samples
 from palpate.recording import Recording
@@ -119,42 +119,6 @@ def test_a_stop_at_which_the_tool_turns_keeps_its_slope(seed: int) -> None:
     assert min(slopes) > 0.6
 
 
-def error_of(model: Model, law: Callable[[Array, float], Array], at: Array) -> float:
-    """Returns the RMS error of a model at positions (n,) of both strokes [standard deviations]."""
-    truth = np.concatenate([law(at, way) for way in (1.0, -1.0)])
-    force = np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
-    return float(np.sqrt(np.mean((force - truth) ** 2)) / np.std(truth))
-
-
-def test_a_play_radius_does_not_replace_the_stop_at_which_the_tool_turns() -> None:
-    """Wavelets of rows far behind turns had no stop; a play radius five times the true one replaced it."""
-
-    def lever(u: Array, s: Array | float) -> Array:
-        stop = 0.04 * np.logaddexp(0.0, (u - 0.982) / 0.001)
-        return np.asarray(u - (0.1 + 0.1 * s) * np.expm1(-u / 0.02) + stop)
-
-    u = np.r_[np.linspace(0.0, 1.0, 300), np.linspace(1.0, 0.0, 300)]
-    force = lever(u, state(u, 0.002, 0.0)) + np.random.default_rng(4).normal(0.0, 1e-3, len(u))
-    model = identify(Recording.from_arrays(u, 0.02 * np.round(force / 0.02), 0.002 * np.arange(len(u))))
-    assert error_of(model, lever, np.linspace(0.01, 1.0, 1000)) < 0.02
-
-
-@pytest.mark.parametrize("seed", [1, 10])
-def test_a_play_radius_does_not_replace_a_peak_between_steps_of_the_tool(seed: int) -> None:
-    """A play radius that is larger than the distance of two rows replaced the friction of a detent."""
-
-    def pen(x: Array, s: Array | float) -> Array:
-        detent = 0.9 * np.exp(-(((x - 4.2) / 0.5) ** 2))
-        return np.asarray(0.8 + 0.7 * x + (0.25 + detent) * s + 30.0 * np.maximum(x - 6.0, 0.0))
-
-    x = np.round(np.linspace(0.0, 6.2, 40), 2)
-    path, way = np.tile(np.r_[x, x[-2::-1]], 3), np.tile(np.r_[np.ones(40), -np.ones(39)], 3)
-    force = pen(path, way) + np.random.default_rng(seed).normal(0.0, 0.02, len(path))
-    gram_force = 9.80665e-3
-    model = identify(path, gram_force * np.round(force / gram_force))
-    assert error_of(model, pen, x) < 0.1
-
-
 def test_wavelets_do_not_imitate_a_play_between_the_tried_radii() -> None:
     """Narrow wavelets fitted the reversals at the end of the travel: the slope of the release was five times
     the true one, and no play radius was found."""
@@ -216,7 +180,7 @@ def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
 
     def states(position: Array, force: Array, role: Int8Vector) -> list[Array]:
         rows = Rows(("position",), position[:, None], force, starts=(0,), role=role, corners=BOX).limited()
-        found = PlaySearch(Samples(rows, options, 1024), options).starts
+        found = PlaySearch(Samples(rows, options, 1024), options).best_of_options(Basis.empty(1))
         return [each.side[rows.fitted] for each in found]
 
     alone = states(x, force, role)
