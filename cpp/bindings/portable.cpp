@@ -88,7 +88,8 @@ void bind_lines(py::module_& module) {
                       "Share of a stretch that is left after a period at rest.")
         .def_readonly("largest_stretch", &ExportedMemory::largest_stretch)
         .def_readonly("sudden", &ExportedMemory::sudden, "Stiffness for a motion within one period.")
-        .def_readonly("contact", &ExportedMemory::contact, "Sign of the force against which the branches do not pull; 0: none.");
+        .def_readonly("contact", &ExportedMemory::contact,
+                      "Sign of the force against which the branches do not pull; 0: none.");
     py::class_<EdgeLine>(module, "EdgeLine",
                          "End of the domain, with force, slope and antiderivatives of the line beyond it.")
         .def_readonly("edge", &EdgeLine::edge)

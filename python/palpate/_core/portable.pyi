@@ -136,9 +136,9 @@ class ExportedMemory:
     Branches of a model with memory. The ratio is in units of force.
     """
     @property
-    def contact(self) -> bool:
+    def contact(self) -> int:
         """
-        True if the branches do not pull the tool.
+        Sign of the force against which the branches do not pull; 0: none.
         """
     @property
     def kept(self) -> list[float]:

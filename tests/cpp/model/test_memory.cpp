@@ -189,7 +189,8 @@ TEST(Memory, MirroredObjectHasTheMirroredForce) {
         MemoryParameters memory = one_branch(uniform(random, 1.0, 10.0), uniform(random, 0.1, 1.0));
         memory.ratio = {.linear = {0.5}, .bias = 1.0};
         const ForceModel model =
-            ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain(Continuation::Free)}.with_memory(memory);
+            ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, test::unit_domain(Continuation::Free)}.with_memory(
+                memory);
         memory.ratio.linear = {-0.5};
         const ForceModel mirrored = ForceModel{{1, {}, {}, {}, {1.0}, 0.0}, mirror}.with_memory(memory);
         const auto object = force_of(model, 1e-3);

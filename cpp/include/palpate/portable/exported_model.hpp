@@ -57,7 +57,7 @@ struct ExportedMemory {
     std::vector<double> kept;             ///< share of a stretch that is left after a period at rest [-]
     std::vector<double> largest_stretch;  ///< bound of |e_j|
     double sudden = 0.0;                  ///< sum of the stiffnesses for a motion within one period
-    int contact = 0;                      ///< sign of the force against which the branches do not pull; 0: none
+    int contact = 0;  ///< sign of the force against which the branches do not pull; 0: none
 };
 
 /// A model as tables and numbers for a program in C without a library: the force law, and the structure of a plan.
