@@ -61,13 +61,14 @@ class Strokes:
 def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
     """Returns the directions that all recordings state; without them, whether the rows have a time.
 
-    Directions that the order of rows shows too belong to a motion, as those without a statement do.
+    Directions that the order of rows shows too add nothing to it: the rows are those of a motion, as without
+    a statement.
     """
     side = _all_of([recording.direction for recording in recordings])
     if side is None:
         return Strokes(in_order=all(each.time is not None for each in recordings))
     if {-1.0, 1.0} <= set(side.tolist()) and all(map(states_its_order, recordings)):
-        return Strokes(order=side, in_order=True)
+        return Strokes(order=_all_of([ordered_strokes(each) for each in recordings]), in_order=True)
     return Strokes(side)
 
 
