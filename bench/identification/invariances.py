@@ -197,12 +197,21 @@ def other_zero(rows: Rows, random: Generator) -> Changed:
 
 
 def release_first(rows: Rows, random: Generator) -> Changed | None:
-    """Moves the first press behind the last release; None for an object with memory."""
+    """Starts the recording behind the first press, which is repeated behind the last release; None for an
+    object with memory."""
     if rows.object.branch is not None:
         return None
     first = turns(rows)[0] + 1
     moved = rows.take(np.r_[first : len(rows.force), 0:first])
-    return Changed(replace(moved, motion=replace(moved.motion, time=rows.motion.time)).recording())
+    # A repeated press begins with the friction that the release before left.
+    state = rows.object.state(np.r_[rows.motion.x, rows.motion.x[:first]])[first:]
+    time, x, velocity = rows.motion.time, moved.motion.x, moved.motion.velocity
+    left, before = (
+        rows.object.force(time, x, each, velocity) * rows.object.share_left(x)
+        for each in (state, moved.state)
+    )
+    motion = replace(moved.motion, time=time)
+    return Changed(replace(moved, motion=motion, state=state, force=moved.force + left - before).recording())
 
 
 def small_drift(rows: Rows, random: Generator) -> Changed:

@@ -127,11 +127,16 @@ class Informative:
         self.drop_approach(np.inf if lower is None else lower)
 
     def drop_approach(self, below: float = np.inf) -> None:
-        """Drops rows that are far from the contact, below a position."""
+        """Drops rows that are far from the contact of every recording, below a position.
+
+        A release can end before the tool leaves the object, so that its own contact is that of the press.
+        """
         deepest = max(float(each.position.max()) for each in self.recordings)
-        for number, recording in enumerate(self.recordings):
-            far = roles_of(recording, deepest) == Role.APPROACH
-            self._drop(number, far & (recording.position < below), "approach")
+        far = [roles_of(each, deepest) == Role.APPROACH for each in self.recordings]
+        for recording, rows in zip(self.recordings, far, strict=True):
+            below = min(below, float(recording.position[~rows].min(initial=np.inf)))
+        for number, rows in enumerate(far):
+            self._drop(number, rows & (self.recordings[number].position < below), "approach")
 
     @property
     def dropped(self) -> dict[str, int]:

@@ -45,7 +45,7 @@ KEPT = {
 }
 """What each change kept in all of 20 draws; the study prints the shares of all changes and measures."""
 
-KEEPING = with_direction, order_alone, one_file_a_stroke, release_first
+KEEPING = with_direction, order_alone, one_file_a_stroke
 
 THINNING = half_the_rate, stored_by_change, without_the_end, few_rows
 
@@ -73,6 +73,19 @@ def test_a_change_keeps_the_readings_of_the_strokes(change: Callable) -> None:
             assert before <= after, draw
         if change not in ADDING:
             assert after <= before, draw
+
+
+def test_a_press_behind_a_release_begins_with_the_friction_of_the_release() -> None:
+    rows, random = drawn_to_change(10)  # play without load, whose friction reverses on a wide way
+    first = int(np.count_nonzero(rows.stroke == 0))
+    later = release_first(rows, random).recordings
+    press, moved = (
+        each.force[part] for each, part in ((rows.recording(), slice(first)), (later, slice(-first, None)))
+    )
+    x, reach = rows.motion.x[:first], np.ptp(rows.force)
+    wide = x > x.min() + 2.1 * rows.object.turning * rows.object.travel
+    assert np.abs(moved - press)[wide].max() < 1e-4 * reach
+    assert (press - moved)[0] > 0.1 * reach  # from rest, no friction
 
 
 def test_waiting_rows_have_the_force_at_rest() -> None:

@@ -11,7 +11,7 @@ import palpate
 from conftest import sampled
 from imperfect import Array, knob, loop, press_and_release, recorded
 from palpate.recording.contact import contact_at
-from palpate.recording.roles import Role, roles_of
+from palpate.recording.roles import Informative, Role, roles_of
 
 MOTION = press_and_release()
 
@@ -68,6 +68,19 @@ def test_a_long_approach_is_fitted_only_near_the_contact() -> None:
     role = roles_of(recorded(x, np.maximum(50.0 * x, 0.0)), 4.0)
     assert (role[x < -0.6] == Role.APPROACH).all()
     assert (role[x > -0.3] == Role.MOVING).all()
+
+
+def test_a_release_that_ends_before_the_tool_leaves_keeps_the_contact_of_the_press() -> None:
+    x = np.linspace(-0.2, 4.0, 1000)
+    press = recorded(x, np.maximum(50.0 * x, 0.0))
+    release = recorded(x[::-1], np.maximum(80.0 * (x[::-1] - 1.5), 0.0))
+    assert Informative([release]).dropped["approach"] > 200
+    assert Informative([press, release]).dropped == {}
+
+
+def test_a_wait_of_less_time_than_a_hundredth_of_the_travel_takes_is_fitted() -> None:
+    x = np.insert(press_and_release(170), 0, 0.0)
+    assert (roles_of(recorded(x, 12.0 * x)) == Role.MOVING).all()
 
 
 def contact() -> tuple[Array, Array]:

@@ -15,8 +15,8 @@ from ..._core.model import most_wavelets
 from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
-from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
-from ...recording.motion import Piece, ordered_strokes, pieces, resolution_of, velocity
+from ...recording.conversion import MIN_POSITIONS, MIN_ROWS, Motion
+from ...recording.motion import Piece, gaps_of, ordered_strokes, pieces, resolution_of, velocity
 from ...recording.roles import Role, roles_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
@@ -338,19 +338,32 @@ def _first_equal(recordings: Sequence[Recording]) -> list[int]:
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
-    """Returns the indices, among kept rows, at which a recording starts, or a motion behind a gap of time in
-    which the tool may have turned: it does not move on in the direction of the rows before and after."""
+    """Returns the indices, among kept rows, at which a motion starts: with a recording, unless its time goes
+    on from that before, or behind a gap of time in which the tool may have turned: it does not move on in the
+    direction of the rows before and after."""
     starts, before = [], 0
-    for recording, rows in zip(recordings, kept, strict=True):
+    for number, (recording, rows) in enumerate(zip(recordings, kept, strict=True)):
         first = [0] if recording.time is None else [piece.rows.start for piece in pieces(recording)]
         if (way := ordered_strokes(recording)) is not None:
             step = np.sign(np.diff(recording.position, prepend=recording.position[0]))
             earlier, later = np.roll(way, 1), np.append(way[1:], 0)
             moves_on = (earlier == way) & (step == way) & (later == way)
             first = [row for row in first if row == 0 or not moves_on[row]]
+        if number and _goes_on(recordings[number - 1].motion, recording.motion):
+            first = first[1:]
         starts += [before + int(np.count_nonzero(rows[:row])) for row in first]
         before += int(np.count_nonzero(rows))
     return tuple(dict.fromkeys(start for start in starts if start < before))
+
+
+def _goes_on(before: Motion, motion: Motion) -> bool:
+    """True if the time of a motion goes on from that of the one before, without a gap."""
+    if before.time is None or motion.time is None or not motion.time[0] > before.time[-1]:
+        return False
+    time, position = (
+        np.concatenate(both) for both in ((before.time, motion.time), (before.position, motion.position))
+    )
+    return len(before.time) not in gaps_of(time, position)
 
 
 def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:

@@ -284,3 +284,16 @@ def test_a_play_follows_a_motion_over_a_gap_in_which_the_tool_moves_on(
     kept = np.delete(np.arange(400), slice(first, first + 50))
     recording = Recording.from_arrays(position[kept], position[kept], time=time[kept])
     assert rows_of([recording], IdentifyOptions()).starts == starts
+
+
+@pytest.mark.parametrize(("pause_s", "starts"), [(0.01, (0,)), (1.0, (0, 100))], ids=["goes on", "later"])
+def test_a_play_follows_a_motion_from_file_to_file(pause_s: float, starts: tuple[int]) -> None:
+    time = 0.01 * np.arange(200)
+    position = 0.5 - 0.5 * np.cos(np.pi * time)
+    time[100:] += pause_s - 0.01
+    position[100:] += 0.1 * (pause_s - 0.01)  # the tool moved during the pause
+    parts = [
+        Recording.from_arrays(position[rows], position[rows], time=time[rows])
+        for rows in (slice(100), slice(100, 200))
+    ]
+    assert rows_of(parts, IdentifyOptions()).starts == starts

@@ -43,6 +43,16 @@ def model_without_directions() -> Model:
     return identify(Recording.from_arrays(IN_AND_OUT, loop()))
 
 
+def test_stated_directions_of_a_motion_do_not_move_its_turns() -> None:
+    x, side = np.append(IN_AND_OUT, IN_AND_OUT), np.append(SIDE, SIDE)
+    stated = np.roll(side, 1)  # a recorder can state the direction of the motion behind a row
+    ordered, found = (
+        strokes_of([Recording.from_arrays(x, x, time=0.01 * np.arange(1600), direction=each)]).order
+        for each in (None, stated)
+    )
+    assert ordered is not None and np.array_equal(ordered, found)
+
+
 def test_strokes_come_from_the_order_of_rows_and_are_reported() -> None:
     stated = identify(Recording.from_arrays(IN_AND_OUT, loop(), direction=SIDE))
     found = model_without_directions()
