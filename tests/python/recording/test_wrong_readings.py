@@ -279,6 +279,15 @@ def test_wrong_readings_do_not_depend_on_the_units(length: float, force: float) 
     assert wrong_rows(length * PRESS, force * changed(FORCE, {100: 0.0, 300: 500.0})) == [100, 300]
 
 
+def test_rows_with_the_value_of_wrong_readings_are_wrong_near_the_right_force_too() -> None:
+    x = np.concatenate([np.zeros(20), press_and_release(400, 1.0)])
+    y = np.maximum(x - 0.1, 0.0) + np.where(x > 0.0, np.random.default_rng(0).normal(0.0, 0.016, len(x)), 0.0)
+    far, near = [300, 340, 380, 460], [100, 740]  # at 6 times the noise
+    wrong = wrong_rows(x, changed(y, dict.fromkeys([*far, *near], 0.0)))
+    assert wrong == sorted([*far, *near])  # the 20 rows at rest in air are right
+    assert wrong_rows(x, changed(y, dict.fromkeys(near, 0.0))) == []
+
+
 def test_four_equal_readings_in_sequence_belong_to_the_object() -> None:
     assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(range(100, 104), 50.0))) == []
 

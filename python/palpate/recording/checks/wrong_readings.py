@@ -98,6 +98,8 @@ def wrong_readings(
         for values in (position, *inputs):
             found |= _deviating(values, values, position, ~found, at_ends=True)
     found |= _deviating(force if residual is None else residual, force, position, ~found, at_ends=False)
+    if residual is None:
+        found |= _of_one_value(force, found) & (position < position.max())
     if found.mean() > MOST_WRONG_SHARE:
         return np.zeros(len(force), dtype=bool)
     if residual is not None and found.any():
@@ -105,6 +107,17 @@ def wrong_readings(
         several = np.convolve(found, (1, 0, 1), "same")[found] > 0
         found[found] = ~several | (_beyond_neighbours(force, found) > _reach_and_least(force)[1])
     return found
+
+
+def _of_one_value(force: Float1D, wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Returns True (n,) for further rows with a force that several wrong rows (n,) have: a sensor that fails
+    gives one value, often 0, also where this is near the right one."""
+    values, count = np.unique(force[wrong], return_counts=True)
+    again, rows = np.zeros(len(force), dtype=bool), np.flatnonzero(~wrong)
+    around, rest = force[[rows[:-2], rows[2:]]], force[rows[1:-1]]
+    beyond = np.maximum(rest - around.max(axis=0), around.min(axis=0) - rest)
+    again[rows[1:-1]] = np.isin(rest, values[count > 1]) & (beyond > _reach_and_least(force[rows])[1])
+    return again
 
 
 def _beyond_neighbours(values: Float1D, rows: NDArray[np.bool_]) -> Float1D:

@@ -50,7 +50,8 @@ def test_stated_directions_of_a_motion_do_not_move_its_turns() -> None:
         strokes_of([Recording.from_arrays(x, x, time=0.01 * np.arange(1600), direction=each)]).order
         for each in (None, stated)
     )
-    assert ordered is not None and np.array_equal(ordered, found)
+    assert ordered is not None
+    assert np.array_equal(ordered, found)
 
 
 def test_strokes_come_from_the_order_of_rows_and_are_reported() -> None:
