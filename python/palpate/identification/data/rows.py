@@ -338,9 +338,11 @@ def _first_equal(recordings: Sequence[Recording]) -> list[int]:
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
-    """Returns the indices, among kept rows, at which a motion starts: with a recording, unless its time goes
-    on from that before, or behind a gap of time in which the tool may have turned: it does not move on in the
-    direction of the rows before and after."""
+    """Returns the indices, among kept rows, at which a motion starts.
+
+    It starts with a recording, unless its time goes on from that before. It also starts behind a gap of time
+    in which the tool may have turned: it does not move on in the direction of the rows before and after.
+    """
     starts, before = [], 0
     for number, (recording, rows) in enumerate(zip(recordings, kept, strict=True)):
         first = [0] if recording.time is None else [piece.rows.start for piece in pieces(recording)]
