@@ -167,7 +167,7 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any], device: 
     rendered directly.
     """
     if device is not None:
-        require_unit(device, model.units["position"])
+        require_unit(device, model)
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
             plan = Plan.of(model)

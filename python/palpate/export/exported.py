@@ -16,8 +16,9 @@ from .._core.stability import Certificate, Inequality, with_force_error
 from ..errors import InputError, command_word
 from ..model import Model
 from ..planning import Plan, describe, mechanical_units
+from ..planning.device_profile import step_cure
 from ..planning.plan import require_force
-from ..recording.units import unit_of
+from ..recording.columns import LAWS
 from ..verdict import GOOD, Finding, Verdict, no, usable
 from .request import Request
 
@@ -295,7 +296,7 @@ class Exported:
             "contraction of products and sums (-ffp-contract).\n"
             f"force  {self.error_text(model.force_error, model.largest_force, self.force_unit)}\n"
             f"slope  {self.error_text(model.slope_error, model.largest_slope, self.slope_unit)}\n"
-            f"energy up to {model.energy_error:.2g} J\n"
+            f"energy up to {model.energy_error:.2g} {energy_unit(*self.units)}\n"
             f"step   {self.step_error_text()}\n"
             f"Outside the domain, {model.outside_share:.2g} of the change of force since its end is added.\n"
             f"Checked at {self.check.places} counts: at most {used:.2g} of a bound was used.",
@@ -395,10 +396,35 @@ def _encoder_step(device: DeviceProfile | None, request: Request) -> float:
 
 
 def units_of(model: Model) -> tuple[str, str]:
-    """Returns the SI units of position and force."""
-    unit = unit_of(model.units["position"] or "")
-    position = "rad" if unit is not None and unit.si == "rad" else "m"
-    return position, mechanical_units(position)[2]
+    """Returns the units of position and force; a unit that is not stated is the SI unit that suits the
+    other."""
+    position = model.units["position"] or ("rad" if model.units["force"] in ("N*m", "A") else "m")
+    return position, model.units["force"] or mechanical_units(position)[2]
+
+
+def energy_unit(position: str, force: str) -> str:
+    """Returns the unit of the stored energy: J for units of mechanics, else a product."""
+    return "J" if (position, force) in LAWS else f"{force}*{position}"
+
+
+def require_mechanical(model: Model, what: str) -> None:
+    """Refuses a model whose units are neither m and N nor rad and N*m, which `what` needs.
+
+    Raises
+    ------
+    InputError
+        The message states both units and the cure.
+    """
+    position, force = units_of(model)
+    if (position, force) in LAWS:
+        return
+    cure = "multiply the recorded force by its lever arm, and identify the model again"
+    if position == "count":
+        cure = step_cure(model)
+    raise InputError(
+        f"the position of the model is in {position} and its force in {force}: {what} needs m and N, or rad "
+        f"and N*m; {cure}"
+    )
 
 
 def _share(error: float, largest: float) -> float | None:

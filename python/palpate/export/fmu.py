@@ -25,7 +25,7 @@ from ..planning.plan import require_force
 from ..recording.files import replacing
 from ..verdict import Finding, Verdict
 from .c_header import header_text
-from .exported import RANDOM_COUNTS, Exported, units_of
+from .exported import RANDOM_COUNTS, Exported, require_mechanical, units_of
 from .fmu_binary import (
     ENERGY,
     FORCE,
@@ -116,6 +116,7 @@ class Fmu:
         """Makes the tables of the identified model. Its plan is left out, because it holds for a device."""
         model = request.model
         require_force(model)
+        require_mechanical(model, "an FMU")
         if model.memory is not None:
             raise InputError(
                 "the force has a memory, which an FMU does not contain: identify the model with "

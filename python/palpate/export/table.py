@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..frames import pd
 from ..model import Model
 from ..verdict import GOOD
-from .exported import units_of
+from .exported import energy_unit, units_of
 from .request import Request, Written
 
 ROWS = 1001
@@ -45,7 +45,9 @@ def table_of(model: Model) -> pd.DataFrame:
         prefix = f"{name}_" if name else ""
         columns[f"{prefix}force_{force}"] = model.force(x, direction=direction)
         columns[f"{prefix}slope_{force}/{position}"] = model.slope(x, direction=direction)
-    columns["energy_J"] = model.energy(x, direction=0.0 if model.hysteretic else None)
+    columns[f"energy_{energy_unit(position, force)}"] = model.energy(
+        x, direction=0.0 if model.hysteretic else None
+    )
     return pd.DataFrame(columns)
 
 

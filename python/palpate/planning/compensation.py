@@ -65,7 +65,7 @@ def compensate(
     device = find_profile(device)
     if on_device is not None:
         device = timed_on_device(device, real_of("on_device", on_device))
-    require_unit(device, model.units["position"])
+    require_unit(device, model)
     require_force(model)
     if device.admittance is not None:
         raise InputError(f"{device.id} is an admittance display: it has no cogging that a hand feels")

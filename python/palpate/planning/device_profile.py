@@ -13,7 +13,8 @@ import tomli_w
 
 from .. import _core
 from ..arguments import path_of
-from ..errors import InputError
+from ..errors import InputError, command_word
+from ..model import Model
 from ..recording.files import replacing, require_file
 
 if sys.version_info >= (3, 11):
@@ -171,12 +172,22 @@ def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) ->
     return DeviceProfile.load(file)
 
 
-def require_unit(device: _core.device.DeviceProfile, unit: str) -> None:
+def step_cure(model: Model) -> str:
+    """Returns how to identify a model whose positions are counts, in the unit that suits its force."""
+    step, steps = (
+        ("mm/35", "35 steps a mm") if model.units["force"] == "N" else ("rev/4096", "4096 steps a turn")
+    )
+    word = command_word(f"{model.data.columns.get('position', 'NAME')}={step}")
+    return f"identify it with the step of the encoder: --units {word} for {steps}"
+
+
+def require_unit(device: _core.device.DeviceProfile, model: Model) -> None:
     """Refuses a device that moves in another unit than a model. The unit of a model can be empty."""
+    unit = model.units["position"]
     if unit not in ("", device.position_unit):
         cure = f"the example profiles in {unit} are {_example_names(unit)}"
         if unit == "count":
-            cure = "identify it with the step of the encoder: --units NAME=rev/4096 for 4096 steps a turn"
+            cure = step_cure(model)
         raise InputError(
             f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
             f"position unit of the model; {cure}"

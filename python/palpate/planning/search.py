@@ -120,7 +120,7 @@ def plan(
     }.items():
         _require_number(name, value)
     samples = _samples_of(predict)
-    require_unit(device, model.units["position"])
+    require_unit(device, model)
     if model.units["force"] not in ("", _FORCE_UNIT[device.position_unit], "A"):
         raise InputError(
             f"the force unit of the model is {model.units['force']}: must be "

@@ -311,6 +311,48 @@ def test_failed_comparison_writes_nothing_and_exits_with_code_1(
     assert not header.exists()
 
 
+@pytest.mark.parametrize(
+    ("position", "force", "energy"),
+    [("count", "N", "N*count"), ("count", "N*m", "N*m*count"), ("rad", "A", "A*rad")],
+)
+def test_table_curve_and_header_state_the_units_of_the_model(
+    position: str, force: str, energy: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand(units={"position": position, "force": force}).save(tmp_path / "m.json")
+    out = tmp_path / "out"
+    assert main(["export", str(model), "--table", "-o", str(out)]) == 0
+    assert out.read_text().splitlines()[0] == (
+        f"position_{position},force_{force},slope_{force}/{position},energy_{energy}"
+    )
+    assert main(["export", str(model), "--knots", "3", "-o", str(out)]) == 0
+    assert out.read_text().splitlines()[0] == f"travel_percent,position_{position},force_{force}"
+    if force != "A":
+        options = ["--uncertified", "--encoder-step", "1e-4", "--force-limit", "1"]
+        assert main(["export", str(model), "--c", *options, "-o", str(out)]) == 0
+        header = out.read_text()
+        assert f"position in {position}, force in {force}." in header
+        assert f"[{force}/{position}]" in header
+        assert re.search(rf"energy up to \S+ {re.escape(energy)}\n", header)
+
+
+@pytest.mark.parametrize(
+    ("position", "force", "cure"),
+    [
+        ("count", "N", "--units NAME=mm/35 for 35 steps a mm"),
+        ("count", "N*m", "--units NAME=rev/4096 for 4096 steps a turn"),
+        ("rad", "N", "multiply the recorded force by its lever arm"),
+        ("rad", "A", "--torque-constant-Nm-per-A"),
+    ],
+)
+def test_fmu_is_refused_in_other_units_than_those_of_mechanics(
+    position: str, force: str, cure: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand(units={"position": position, "force": force}).save(tmp_path / "m.json")
+    assert main(["export", str(model), "--fmu", "-o", str(tmp_path / "m.fmu")]) == 2
+    assert cure in capsys.readouterr().err
+    assert not (tmp_path / "m.fmu").exists()
+
+
 def test_table_has_the_forces_of_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = keyswitch_by_hand(play_radius=5e-5)
     path = model.save(tmp_path / "key.json")

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 
 from conftest import ROOT
-from palpate import DeviceProfile, InputError
+from models_by_hand import model_by_hand
+from palpate import DeviceProfile, InputError, read_recording
 from palpate.cli.main import main
 from palpate.planning.device_profile import find_profile, require_unit
 
@@ -82,4 +84,21 @@ def test_the_message_on_a_profile_names_a_limited_number_of_fields(tmp_path: Pat
 
 def test_a_model_in_counts_is_refused_with_the_option_that_states_the_step() -> None:
     with pytest.raises(InputError, match=r"must be count, .* --units NAME=rev/4096 for 4096 steps"):
-        require_unit(find_profile("smartknob"), "count")
+        require_unit(find_profile("smartknob"), model_by_hand(units={"position": "count", "force": ""}))
+
+
+@pytest.mark.parametrize(("force", "position_unit"), [("gf", "m"), ("mNm", "rad")])
+def test_the_advised_step_of_the_encoder_suits_the_force(
+    force: str, position_unit: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "press.csv"
+    rows = "".join(f"{k},{k}\n" for k in [*range(20), *range(20)[::-1]])
+    file.write_text(f"axis counts,force_{force}\n{rows}", encoding="utf-8")
+    source = read_recording(file)
+    assert source.units["position"] == "count"
+    model = model_by_hand(units=source.units, data=source.source)
+    with pytest.raises(InputError, match=r"--units .* for ") as refused:
+        require_unit(find_profile("smartknob"), model)
+    words = shlex.split(re.findall(r"--units (.*) for ", str(refused.value))[0])
+    read = read_recording(file, units=dict([words[0].rsplit("=", 1)]))
+    assert read.units["position"] == position_unit
