@@ -29,7 +29,7 @@ from ..identification.options import (
 )
 from ..identification.search.evidence import reporting_to
 from ..model import Model
-from ..model.model_file import CONTINUATIONS
+from ..model.model_file import CONTINUATIONS, dynamics_of
 from ..recording import Recording
 from ..recording.files import CELL_BYTES, TooLargeError, require_memory
 from ..recording.formats import is_read_in_parts
@@ -391,6 +391,7 @@ def identify(
                     "error": f"{rms}{error_text(nrmse, settled, judged)}{left_out}",
                     **({"rows": " ".join(rows_left_out).removesuffix(".")} if rows_left_out else {}),
                     **_outside_text(model, recordings),
+                    **_object_text(model),
                     **_band_text(model, recordings),
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
                     **_corrected_lag(recordings),
@@ -448,6 +449,12 @@ def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, st
         how = f" with {stiffness.text(slope)}" if kind == "linear" else " (the tool leaves)"
         texts.append(f"{side} {unit.text(end)}: {CONTINUATIONS[kind]}{how}")
     return {"outside": "; ".join(texts)}
+
+
+def _object_text(model: Model) -> dict[str, str]:
+    """Returns the line of the summary on mass and damping of the object, if the model has one of them."""
+    values = [f"{name} {value}" for name, value in dynamics_of(model).items()]
+    return {"object": ", ".join(values)} if values else {}
 
 
 def _unit_of(role: str, model: Model, recordings: Sequence[Recording]) -> Unit:

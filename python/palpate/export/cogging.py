@@ -19,9 +19,8 @@ from ..model import Model
 from ..model.model import COMPENSATION_KEY
 from ..planning import friction_of
 from ..verdict import GOOD
-from .exported import units_of
+from .exported import require_carried, units_of
 from .request import Request, Written
-from .table import force_of_position
 
 TURN = 2.0 * math.pi
 """One revolution [rad]"""
@@ -205,7 +204,7 @@ def torque_of_turn(model: Model, encoder_zero: float = 0.0) -> Callable[[Float1D
         The model has no period, a revolution is not a multiple of it, the position is not an angle, or the
         force depends on other quantities.
     """
-    force_of_position(model)
+    require_carried(model, "a table cannot")
     if COMPENSATION_KEY in model.notes:
         raise InputError(
             "the model is a compensation already, and its table would add the cogging: export the identified "

@@ -15,6 +15,7 @@ from .._core.rendering import Scheme, default_play_radius
 from .._core.stability import Certificate, Inequality, with_force_error
 from ..errors import InputError, command_word
 from ..model import Model
+from ..model.model_file import dynamics_of
 from ..planning import Plan, describe, mechanical_units
 from ..planning.device_profile import step_cure
 from ..planning.plan import require_force
@@ -61,6 +62,8 @@ class Exported:
         model = request.model
         require_force(model)
         plan = None if model.plan is None else Plan.of(model)
+        if plan is None:
+            require_carried(model, "an exported program does not", memory=True)
         of_plan = (
             GOOD
             if plan is None
@@ -405,6 +408,39 @@ def units_of(model: Model) -> tuple[str, str]:
 def energy_unit(position: str, force: str) -> str:
     """Returns the unit of the stored energy: J for units of mechanics, else a product."""
     return "J" if (position, force) in LAWS else f"{force}*{position}"
+
+
+def require_carried(model: Model, cannot: str, *, memory: bool = False) -> None:
+    """Refuses a model whose force has a part that a format does not contain.
+
+    Every format contains a force of position, with hysteresis.
+
+    Parameters
+    ----------
+    model : Model
+        The model to export.
+    cannot : str
+        The format and its verb in the message: "a table cannot".
+    memory : bool
+        True if the format contains a memory as well.
+
+    Raises
+    ------
+    InputError
+        The model has several inputs, a memory, damping or a mass. The message states the part and the cure.
+    """
+    if model.dimension != 1:
+        part = f"the force depends on {' and '.join(model.inputs)}"
+    elif model.memory is not None and not memory:
+        part = "the force has a memory"
+    elif moving := dynamics_of(model):
+        part = (
+            f"the force contains a {' and a '.join(f'{name} of {value}' for name, value in moving.items())}"
+        )
+    else:
+        return
+    inputs = "position,hysteresis" if model.hysteretic else "position"
+    raise InputError(f"{part}, which {cannot} contain: identify the model with --inputs {inputs}")
 
 
 def require_mechanical(model: Model, what: str) -> None:

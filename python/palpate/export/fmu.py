@@ -19,13 +19,12 @@ from .. import _core
 from .._core.model import fingerprint
 from .._core.portable import ExportedModel
 from .._core.rendering import Scheme, default_play_radius
-from ..errors import InputError
 from ..model import Model
 from ..planning.plan import require_force
 from ..recording.files import replacing
 from ..verdict import Finding, Verdict
 from .c_header import header_text
-from .exported import RANDOM_COUNTS, Exported, require_mechanical, units_of
+from .exported import RANDOM_COUNTS, Exported, require_carried, require_mechanical, units_of
 from .fmu_binary import (
     ENERGY,
     FORCE,
@@ -70,7 +69,7 @@ def write(request: Request) -> Written:
     Raises
     ------
     InputError
-        There is no C compiler, or the model is not a force of position.
+        There is no C compiler, or the model is not a force of position in units of mechanics.
     """
     fmu = Fmu.of(request)
     with tempfile.TemporaryDirectory() as folder:
@@ -117,11 +116,7 @@ class Fmu:
         model = request.model
         require_force(model)
         require_mechanical(model, "an FMU")
-        if model.memory is not None:
-            raise InputError(
-                "the force has a memory, which an FMU does not contain: identify the model with "
-                "--inputs position"
-            )
+        require_carried(model, "an FMU does not")
         content = model.to_dict() | {"plan": None, "certificate": None}
         if model.hysteretic and model.play_radius is None:
             content["play_radius"] = default_play_radius(model, 0.0)

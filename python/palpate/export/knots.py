@@ -7,9 +7,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..verdict import GOOD
-from .exported import units_of
+from .exported import require_carried, units_of
 from .request import Request, Written
-from .table import force_of_position
 
 POSITIONS_PER_INTERVAL = 1000
 """Number of positions between two knots at which the curve is compared with the model."""
@@ -24,7 +23,7 @@ def write(request: Request) -> Written:
         The force depends on other quantities than position and direction, or there are fewer than 2 knots.
     """
     model, count = request.model, request.knots or 0
-    force_of_position(model)
+    require_carried(model, "a curve of knots cannot")
     if not 2 <= count <= 1001:
         raise InputError(f"--knots is {count}: must be from 2 to 1001")
     position, force = units_of(model)

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
 from ..frames import pd
 from ..model import Model
 from ..verdict import GOOD
-from .exported import energy_unit, units_of
+from .exported import energy_unit, require_carried, units_of
 from .request import Request, Written
 
 ROWS = 1001
@@ -34,9 +33,9 @@ def table_of(model: Model) -> pd.DataFrame:
     Raises
     ------
     InputError
-        The force depends on other quantities than position and direction.
+        The force depends on other quantities than position and direction, or the model has mass or damping.
     """
-    force_of_position(model)
+    require_carried(model, "a table cannot")
     position, force = units_of(model)
     x = np.linspace(model.lower[0], model.upper[0], ROWS)
     columns = {f"position_{position}": x}
@@ -49,22 +48,3 @@ def table_of(model: Model) -> pd.DataFrame:
         x, direction=0.0 if model.hysteretic else None
     )
     return pd.DataFrame(columns)
-
-
-def force_of_position(model: Model) -> None:
-    """Refuses a model whose force depends on other quantities than position and direction.
-
-    Raises
-    ------
-    InputError
-        The model has several inputs or a memory.
-    """
-    if model.dimension != 1:
-        raise InputError(
-            f"the model has {model.dimension} inputs: a table needs a force of position alone, so identify "
-            "the model with --inputs position"
-        )
-    if model.memory is not None:
-        raise InputError(
-            "the force has a memory, which a table cannot contain: identify the model with --inputs position"
-        )

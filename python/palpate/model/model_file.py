@@ -172,12 +172,19 @@ def describe(model: Model) -> str:
         lines += _band_lines(model.band, model.units)
     if model.play_radius is not None:
         lines.append(f"  play radius {model.play_radius:.4g} {position}")
-    if model.mass is not None:
-        lines.append(f"  mass {model.mass:.4g}")
-    if model.damping is not None:
-        lines.append(f"  damping {model.damping:.4g}")
+    lines += [f"  {name} {value}" for name, value in dynamics_of(model).items()]
     lines += ["", *_terms(model, force)]
     return "\n".join(lines)
+
+
+def dynamics_of(model: Model) -> dict[str, str]:
+    """Returns mass and damping of a model with their units for display, by name, without those that are
+    zero or that it does not have."""
+    position, force = model.units["position"], model.units["force"]
+    known = bool(position and force)
+    mass = {"m N": "kg", "rad N*m": "kg*m^2"}.get(f"{position} {force}", f"{force}*s^2/{position}")
+    values = (("mass", model.mass, mass), ("damping", model.damping, f"{force}*s/{position}"))
+    return {name: f"{value:.4g} {unit if known else ''}".rstrip() for name, value, unit in values if value}
 
 
 def _band_lines(band: Band, units: Mapping[str, str]) -> list[str]:

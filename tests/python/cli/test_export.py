@@ -353,6 +353,21 @@ def test_fmu_is_refused_in_other_units_than_those_of_mechanics(
     assert not (tmp_path / "m.fmu").exists()
 
 
+@pytest.mark.parametrize("kind", ["--table", "--fmu", "--knots 3", "--c --uncertified"])
+@pytest.mark.parametrize(
+    ("name", "value", "unit"), [("damping", 1.5, "N*m*s/rad"), ("mass", 0.002, "kg*m^2")]
+)
+def test_a_format_refuses_a_part_of_the_force_that_it_does_not_contain(
+    kind: str, name: str, value: float, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand(**{name: value}).save(tmp_path / "m.json")
+    assert main(["export", str(model), *kind.split(), "-o", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert f"a {name} of {value:g} {unit}, which " in error
+    assert error.endswith("contain: identify the model with --inputs position\n")
+    assert not (tmp_path / "out").exists()
+
+
 def test_table_has_the_forces_of_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = keyswitch_by_hand(play_radius=5e-5)
     path = model.save(tmp_path / "key.json")

@@ -12,7 +12,8 @@ import pytest
 
 from conftest import sampled
 from models_by_hand import model_by_hand
-from palpate import DeviceProfile, load_model, read_recording, verify
+from palpate import DeviceProfile, Model, load_model, read_recording, verify
+from palpate.cli import identify
 from palpate.cli.main import main
 from palpate.recording.units import GRAVITY
 
@@ -92,6 +93,15 @@ def test_a_summary_uses_the_units_of_the_file(here: Path, capsys: pytest.Capture
     assert re.search(r" gf in one row, at position \S+ mm", lines["largest"])
     identified = "\n".join(printed(SUMMARIES["identify"], capsys))
     assert re.search(r"error +RMS \S+ gf, ", identified)
+
+
+def test_identify_prints_mass_and_damping_of_the_object_with_their_units(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = load_model("dome-model.json").to_dict() | {"mass": 0.25, "damping": 12.5}
+    monkeypatch.setattr(identify, "identify_model", lambda *_, **__: Model.from_dict(content))
+    (found,) = [line for line in printed(SUMMARIES["identify, not held out"], capsys) if line[:6] == "object"]
+    assert re.fullmatch(r"object +mass 0.25 kg, damping 12.5 N\*s/m", found)
 
 
 def test_the_help_of_identify_has_at_most_16_lines_before_the_expert_options(

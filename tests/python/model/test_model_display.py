@@ -117,3 +117,19 @@ def test_html_begins_with_the_verdict_and_its_reasons() -> None:
     assert html.count("<path") == 1
     assert keyswitch_by_hand()._repr_html_().count("<path") == 2
     assert "<svg" not in two_inputs()._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("units", "mass", "damping"),
+    [
+        ({"position": "m", "force": "N"}, "mass 0.5 kg", "damping 2 N*s/m"),
+        ({"position": "rad", "force": "N*m"}, "mass 0.5 kg*m^2", "damping 2 N*m*s/rad"),
+        ({"position": "count", "force": "N"}, "mass 0.5 N*s^2/count", "damping 2 N*s/count"),
+        ({"position": "", "force": ""}, "mass 0.5", "damping 2"),
+    ],
+)
+def test_mass_and_damping_are_shown_with_their_units(units: dict[str, str], mass: str, damping: str) -> None:
+    lines = str(model_by_hand(units=units, mass=0.5, damping=2.0)).splitlines()
+    assert [f"  {mass}", f"  {damping}"] == [
+        line for line in lines if line.startswith(("  mass", "  damping"))
+    ]
