@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -115,7 +116,7 @@ class Plan:
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
     """Device property that `model` needs for a certificate or an accepted force error; empty if the plan has
-    both, or if no property helps"""
+    both, if only the force limit of the device is too low, or if no property helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -142,9 +143,9 @@ class Plan:
 
     @cached_property
     def force_error(self) -> StaticForceError:
-        """Felt force minus identified force for a handle at rest, caused by a limited network and a soft
-        coupling."""
-        return static_force_error(self.model, self.rendered, self.scheme)
+        """Felt force minus identified force for a handle at rest, caused by a limited network, a soft
+        coupling, and the force limit of the device."""
+        return _static_error(*self.forces_at_rest())
 
     @property
     def held_by_account(self) -> bool:
@@ -446,8 +447,19 @@ class Plan:
     def forces_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
         """Returns positions (n,) over the domain, and identified and felt force (k, n) of a handle at rest.
 
-        The k strokes are press and release for a model with hysteresis.
+        The k strokes are press and release for a model with hysteresis. The force limit of the device limits
+        the felt force.
         """
+        x, identified, rendered = self._unlimited_at_rest()
+        limit = self._force_limit
+        return x, identified, np.clip(rendered, -limit, limit)
+
+    @property
+    def _force_limit(self) -> float:
+        """Force limit of the device; infinity without a device"""
+        return math.inf if self.certificate is None else self.certificate.device.force_limit
+
+    def _unlimited_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
         x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
         if self.model.of_velocity:  # this model is always rendered without a coupling
             force = self.model.predict(np.column_stack([x, np.zeros_like(x)]))[None, :]
@@ -524,6 +536,12 @@ class Plan:
             "force range"
         )
         cause = f". The object {self.needs}" if self.needs else ""
+        largest = float(np.abs(self._unlimited_at_rest()[2]).max())
+        if largest > self._force_limit:
+            cause += (
+                f". The device gives at most {self._force_limit:.4g} {unit}: use a device with a force limit "
+                f"of at least {rounded(math.ceil, largest):g} {unit}"
+            )
         if error.share <= ACCEPTED_FORCE_ERROR:
             return (usable(f"{difference}{cause}"),)
         if error.share <= self.accept_force_error:
@@ -568,6 +586,15 @@ def require_force(model: Model) -> None:
         )
 
 
+def rounded(towards: Callable[[float], int], value: float) -> float:
+    """Rounds a device property to three digits in the safe direction, so that the printed number is
+    sufficient."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{towards(value / unit) * unit:.3g}")
+
+
 def _percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
@@ -576,8 +603,8 @@ def _percent(share: float) -> str:
 class StaticForceError:
     """Felt force minus identified force for a handle at rest, over the domain and both strokes.
 
-    The force error contains the effects of a limited network and a soft coupling, not those of damping, delay
-    or encoder.
+    The force error contains the effects of a limited network, a soft coupling and the force limit of the
+    device, not those of damping, delay or encoder.
     """
 
     largest: float
@@ -594,7 +621,7 @@ class StaticForceError:
 
 def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Scheme) -> StaticForceError:
     """Returns the force error for a handle at rest if `rendered` is rendered in place of the model
-    `identified`.
+    `identified`, by a device without force limit.
 
     Parameters
     ----------
@@ -607,8 +634,12 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
     if _is_exact(scheme) and rendered is identified:
         return StaticForceError(0.0, 0.0, 0.0, 0.0)
     x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)
-    wanted = strokes(identified, x)
-    error = _at_rest(rendered, scheme, x) - wanted
+    return _static_error(x, strokes(identified, x), _at_rest(rendered, scheme, x))
+
+
+def _static_error(x: Float1D, wanted: Float2D, felt: Float2D) -> StaticForceError:
+    """Returns the error of the felt force (k, n) at positions (n,)."""
+    error = felt - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
         largest,

@@ -31,6 +31,7 @@ from .plan import (
     Plan,
     network_of,
     require_force,
+    rounded,
     static_force_error,
     strokes,
     with_network,
@@ -172,7 +173,8 @@ def plan(
         accept_force_error,
     )
     stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
-    if stable_only or planned.verdict.level == "no":
+    too_weak = chosen.certificate.refused or _error(task, chosen) > accept_force_error
+    if stable_only or too_weak:
         planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
     elif planned.limited is not None:
         planned = replace(planned, needs=_wider_play(task))
@@ -402,7 +404,7 @@ def _wider_play(task: Task) -> str:
     found = CANDIDATES["direct"].propose(free)
     if isinstance(found, Refusal) or not found.certificate.certified:
         return ""
-    radius, unit = _rounded(math.ceil, found.scheme.play_radius), task.device.position_unit
+    radius, unit = rounded(math.ceil, found.scheme.play_radius), task.device.position_unit
     return (
         f"needs a play radius of {radius:g} {unit} (has {given:.3g}): give --play-radius {radius:g}, and "
         f"after a reversal the force changes over {2.0 * radius:.3g} {unit}"
@@ -516,7 +518,7 @@ def _properties(
     f_c = device.coulomb_friction or 1e-3 * (device.encoder_step * steepest + device.force_step) or 1e-9
 
     def faster(on: DeviceProfile, factor: float) -> DeviceProfile:
-        rate = _rounded(math.ceil, factor / device.period_s)
+        rate = rounded(math.ceil, factor / device.period_s)
         jitter_s = device.jitter_s / (rate * device.period_s)
         delay_s = device.delay_s / (rate * device.period_s)
         # A host that is faster than the loop of the controller sends forces instead of lines
@@ -533,7 +535,7 @@ def _properties(
     fastest = _fastest_on_device(device)
 
     def on_controller(on: DeviceProfile, factor: float) -> DeviceProfile:
-        rate = min(_rounded(math.ceil, factor / device.period_s), fastest)
+        rate = min(rounded(math.ceil, factor / device.period_s), fastest)
         return timed_on_device(on, rate) if fastest else on
 
     shorter = [name for name, value in (("jitter", device.jitter_s), ("delay", device.delay_s)) if value]
@@ -547,14 +549,14 @@ def _properties(
 
     return (
         _Property(
-            lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
+            lambda on, factor: _changed(on, viscous_damping=rounded(math.ceil, factor * b)),
             lambda on: (
                 f"device damping b >= {on.viscous_damping:.3g} {damping} (has {device.viscous_damping:.3g})"
             ),
             lambda on: not 0.0 < _MOST_IMPROVED * device.viscous_damping < on.viscous_damping,
         ),
         _Property(
-            lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
+            lambda on, factor: _changed(on, coulomb_friction=rounded(math.ceil, factor * f_c)),
             lambda on: (
                 f"device friction f_c >= {on.coulomb_friction:.3g} {force} "
                 f"(has {device.coulomb_friction:.3g})"
@@ -568,7 +570,7 @@ def _properties(
             lambda on: fastest > 0.0,
         ),
         _Property(
-            lambda on, factor: _changed(on, encoder_step=_rounded(math.floor, device.encoder_step / factor)),
+            lambda on, factor: _changed(on, encoder_step=rounded(math.floor, device.encoder_step / factor)),
             lambda on: f"an encoder step of {on.encoder_step:.3g} {position}",
             lambda on: on.encoder_step * _MOST_IMPROVED >= device.encoder_step,
         ),
@@ -606,7 +608,7 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
 
 def _down(value: float) -> float:
     """Rounds down to three digits."""
-    return _rounded(math.floor, value)
+    return rounded(math.floor, value)
 
 
 def _slope_unit(device: DeviceProfile) -> str:
@@ -615,12 +617,3 @@ def _slope_unit(device: DeviceProfile) -> str:
 
 def _changed(device: DeviceProfile, **fields: Any) -> DeviceProfile:
     return DeviceProfile(**device.to_dict() | fields)
-
-
-def _rounded(towards: Callable[[float], int], value: float) -> float:
-    """Rounds a device property to three digits in the safe direction, so that the printed number is
-    sufficient."""
-    if value == 0.0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return float(f"{towards(value / unit) * unit:.3g}")

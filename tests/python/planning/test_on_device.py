@@ -59,8 +59,9 @@ def test_only_the_damping_bound_scales_with_the_rate() -> None:
 
 def test_the_controller_renders_a_wall_that_the_host_cannot() -> None:
     wall = model_by_hand(linear=[150.0])
-    assert plan(wall, KNOB).limited is not None
-    on_controller = plan(wall, KNOB, on_device=40e3)
+    strong = DeviceProfile(**KNOB.to_dict() | {"force_limit": 80.0})
+    assert plan(wall, strong).limited is not None
+    on_controller = plan(wall, strong, on_device=40e3)
     assert (on_controller.structure, on_controller.limited) == ("direct", None)
     assert str(on_controller.verdict) == "good"
 

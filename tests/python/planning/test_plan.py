@@ -143,7 +143,7 @@ def test_prediction_changes_neither_network_nor_certificate() -> None:
 def test_late_device_gets_a_prediction_if_only_that_is_certified() -> None:
     """With one sample delay, slope 40 needs a damping of 0.060 without prediction, 0.052 with one sample."""
     model = model_by_hand(weight=[0.0], linear=[40.0])
-    device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
+    device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3, force_limit=20.0)
     chosen = plan(model, device)
     assert (chosen.limited, chosen.scheme.predict, str(chosen.verdict)) == (None, 1, "good")
     without = plan(model, device, predict="off")
@@ -178,7 +178,7 @@ def test_a_prediction_of_a_model_with_hysteresis_keeps_its_play_radius() -> None
 def test_verb_takes_stores_and_prints_prediction_samples(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model_by_hand(weight=[0.0], linear=[20.0]).save("soft.json")
+    model_by_hand(weight=[0.0], linear=[20.0], upper=[0.2]).save("soft.json")
     for predict, samples in (("auto", 1), ("off", 0), ("4", 4)):
         assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", predict, "-o", "p.json"]) == 0
         shown = capsys.readouterr().out

@@ -14,7 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from conftest import sampled
-from models_by_hand import keyswitch_by_hand, model_by_hand
+from models_by_hand import keyswitch_by_hand, model_by_hand, relaxing_by_hand
 from palpate import (
     DeviceProfile,
     InputError,
@@ -112,6 +112,45 @@ def test_accepted_plan_does_not_change_the_identified_network(
     assert f"{steep_switch.n_wavelets} wavelets" in shown
     for words in ("direct, with a limited network", "phantom-premium-1.0", "is accepted"):
         assert words in shown
+
+
+@pytest.mark.parametrize(("force_limit", "level"), [(2.6, "good"), (2.4, "usable"), (1.25, "no")])
+def test_the_force_error_contains_the_force_above_the_limit_of_the_device(
+    force_limit: float, level: str
+) -> None:
+    """A spring of 5 N*m/rad needs 2.5 N*m at 0.5 rad."""
+    device = DeviceProfile(coulomb_friction=0.02, force_limit=force_limit)
+    chosen = plan(model_by_hand(weight=[0.0]), device)
+    missing = max(0.0, 2.5 - force_limit)
+    assert chosen.verdict.level == level
+    assert chosen.force_error.largest == pytest.approx(missing)
+    assert chosen.force_error.share == pytest.approx(missing / 2.5)
+    assert chosen.forces_at_rest()[2].max() == pytest.approx(min(2.5, force_limit))
+    cure = (
+        f"The device gives at most {force_limit:g} N*m: use a device with a force limit of at least 2.5 N*m"
+    )
+    assert (cure in str(chosen.verdict)) == (missing > 0.0)
+    assert not chosen.needs
+
+
+@pytest.mark.parametrize("kind", ["of velocity", "memory"])
+def test_the_force_limit_counts_for_a_force_that_depends_on_motion(kind: str) -> None:
+    model = relaxing_by_hand(linear=[20.0])
+    if kind == "of velocity":
+        model = Model.from_network(
+            kind="position_velocity",
+            inputs=("position", "velocity"),
+            units={"position": "m", "force": "N"},
+            alpha=np.zeros((0, 2)),
+            beta=np.zeros((0, 2)),
+            weight=[],
+            linear=[20.0, 0.01],
+            lower=[0.0, -1.0],
+            upper=[1.0, 1.0],
+        )
+    chosen = plan(model, changed(find_profile("voice-coil"), force_limit=15.0))
+    assert chosen.force_error.largest == pytest.approx(5.0, rel=0.01)
+    assert "use a device with a force limit of at least 20 N" in str(chosen.verdict)
 
 
 def test_simulate_compares_with_the_identified_force_and_renders_the_limited_one(
@@ -234,7 +273,9 @@ def test_a_rate_is_advised_with_the_place_where_it_can_run() -> None:
 def test_a_profile_with_a_motor_controller_is_advised_to_run_the_model_there(delay_s: float) -> None:
     model = model_by_hand(weight=[0.0], linear=[20.0])
     timing = OnDevice(highest_rate_hz=40e3, delay_s=delay_s)
-    knob = DeviceProfile(viscous_damping=1e-2, coulomb_friction=0.05, delay_s=2e-3, on_device=timing)
+    knob = DeviceProfile(
+        viscous_damping=1e-2, coulomb_friction=0.05, delay_s=2e-3, force_limit=10.0, on_device=timing
+    )
     sentence = str(plan(model, knob).verdict)
     advised = re.search(r"--on-device (\S+)\)", sentence)
     if delay_s > 1e-3:
