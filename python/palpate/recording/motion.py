@@ -285,9 +285,9 @@ def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] |
         stopped = begin > 1 and moved_there < 0.5 * speed[begin - 1] * (tick[begin - 1] - tick[begin - 2])
         # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
         first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
-        # One slow row is a turn between two rows, and lasts no time.
-        lasting = tick[end - 1] - tick[first_row]
-        found[first_row:end] = lasting * speed[begin:end].max() >= SHORT_WAY
+        # One slow row is a turn between two rows.
+        lasting = tick[end - 1] - tick[first_row] + 1.0
+        found[first_row:end] = end - first_row > 1 and lasting * speed[begin:end].max() >= SHORT_WAY
     return found
 
 

@@ -78,11 +78,6 @@ def test_a_release_that_ends_before_the_tool_leaves_keeps_the_contact_of_the_pre
     assert Informative([press, release]).dropped == {}
 
 
-def test_a_wait_of_less_time_than_a_hundredth_of_the_travel_takes_is_fitted() -> None:
-    x = np.insert(press_and_release(170), 0, 0.0)
-    assert (roles_of(recorded(x, 12.0 * x)) == Role.MOVING).all()
-
-
 def contact() -> tuple[Array, Array]:
     """Returns position and force of a press and a release that begin and end near the contact."""
     x = np.concatenate([np.linspace(-0.2, 4.0, 1000), np.linspace(4.0, -0.2, 1000)])

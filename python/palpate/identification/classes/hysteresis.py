@@ -306,13 +306,7 @@ class PlaySearch:
             least = self._residual_squares(HysteresisInput(order, known), basis, known)
             if len(self._usable) > 2:
                 first, last = 0.0, math.inf if self._turns_apart(order) else 0.0
-
-        def error(strokes: HysteresisInput) -> float:
-            # A radius that no row shows has the error of the order; rounding would decide between such radii.
-            shown = order is None or not np.allclose(strokes.side[known], order[known])
-            return self._residual_squares(strokes, basis, known) if shown else least
-
-        errors = [first, *map(error, self._usable), last]
+        errors = [first, *(self._residual_squares(each, basis, known) for each in self._usable), last]
         return [
             strokes
             for strokes, before, error, after in zip(

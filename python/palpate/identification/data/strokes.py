@@ -61,14 +61,15 @@ class Strokes:
 def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
     """Returns the directions that all recordings state; without them, whether the rows have a time.
 
-    Directions that the order of rows shows too add nothing to it: the rows are those of a motion, as without
-    a statement.
+    Directions that the order of rows shows too add nothing to it, except rows of neither direction: the rows
+    are those of a motion, as without a statement.
     """
     side = _all_of([recording.direction for recording in recordings])
     if side is None:
         return Strokes(in_order=all(each.time is not None for each in recordings))
     if {-1.0, 1.0} <= set(side.tolist()) and all(map(states_its_order, recordings)):
-        return Strokes(order=_all_of([ordered_strokes(each) for each in recordings]), in_order=True)
+        order = _all_of([ordered_strokes(each) for each in recordings])
+        return Strokes(order=None if order is None else order * (side != 0.0), in_order=True)
     return Strokes(side)
 
 

@@ -171,19 +171,6 @@ def test_models_of_several_inputs_are_not_compared() -> None:
         compare(model, model)
 
 
-def test_strokes_without_a_turn_show_no_play_radius() -> None:
-    """Each stroke is a motion of its own: its rows with a known direction state have one direction."""
-    options, x, order = (
-        IdentifyOptions(),
-        np.r_[np.linspace(0.0, 1.0, 400), np.linspace(1.0, 0.0, 400)],
-        np.repeat([1.0, -1.0], 400),
-    )
-    for seed in range(8):
-        force = x + 0.1 * order + np.random.default_rng(seed).normal(0.0, 0.01, 800)
-        rows = Rows(("position",), x[:, None], force, order=order, starts=(0, 400)).limited()
-        assert PlaySearch(Samples(rows, options, 1024), options).best_of_options(Basis.empty(1)) == []
-
-
 def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
     rng, options = np.random.default_rng(4), IdentifyOptions()
     exact = np.tile(np.r_[np.linspace(0.0, 1.0, 400), np.linspace(1.0, 0.0, 400)], 2)

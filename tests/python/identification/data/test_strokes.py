@@ -54,6 +54,14 @@ def test_stated_directions_of_a_motion_do_not_move_its_turns() -> None:
     assert np.array_equal(ordered, found)
 
 
+def test_rows_that_are_stated_to_have_no_direction_keep_none() -> None:
+    x, stated = np.append(IN_AND_OUT, IN_AND_OUT), np.append(SIDE, SIDE)
+    stated[[0, 399, 800]] = 0.0
+    found = strokes_of([Recording.from_arrays(x, x, time=0.01 * np.arange(1600), direction=stated)]).order
+    assert found is not None
+    assert np.flatnonzero(found == 0.0).tolist() == [0, 399, 800]
+
+
 def test_strokes_come_from_the_order_of_rows_and_are_reported() -> None:
     stated = identify(Recording.from_arrays(IN_AND_OUT, loop(), direction=SIDE))
     found = model_without_directions()
