@@ -106,7 +106,7 @@ def simulate(
             lambda tick: shown(f"{100 * tick / ticks:.1f} %"),
         )
     error = force_error(plan, rendered)
-    verdict = model.verdict + judge(plan, rendered, error)
+    verdict = model.verdict + judge(plan, rendered, error, simulated)
     if other is not None and plan.certificate is None:
         verdict += Verdict((usable(f"nothing is proved on {other.id}: this is one simulated motion"),))
     status_counts = Counter(rendered.columns["status"])

@@ -454,6 +454,11 @@ class Plan:
         limit = self._force_limit
         return x, identified, np.clip(rendered, -limit, limit)
 
+    @cached_property
+    def largest_at_rest(self) -> float:
+        """Largest absolute force that a handle at rest would feel without the force limit of the device."""
+        return float(np.abs(self._unlimited_at_rest()[2]).max())
+
     @property
     def _force_limit(self) -> float:
         """Force limit of the device; infinity without a device"""
@@ -536,11 +541,10 @@ class Plan:
             "force range"
         )
         cause = f". The object {self.needs}" if self.needs else ""
-        largest = float(np.abs(self._unlimited_at_rest()[2]).max())
-        if largest > self._force_limit:
+        if self.largest_at_rest > self._force_limit:
             cause += (
                 f". The device gives at most {self._force_limit:.4g} {unit}: use a device with a force limit "
-                f"of at least {rounded(math.ceil, largest):g} {unit}"
+                f"of at least {rounded(math.ceil, self.largest_at_rest):g} {unit}"
             )
         if error.share <= ACCEPTED_FORCE_ERROR:
             return (usable(f"{difference}{cause}"),)

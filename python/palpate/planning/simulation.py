@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from ..model import Model
 from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX, Unit
 from ..verdict import Finding, Verdict, no, usable
-from .plan import Plan, describe
+from .plan import Plan, describe, rounded
 
 START = "handle_start"
 MIDDLE = "handle_middle"
@@ -85,11 +86,12 @@ def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     if not len(inside):
         return usual
     first, last = inside[0], inside[-1]
-    # The handle stops where the force of the hand's spring equals the felt force and the device friction.
+    # The handle stops where the force of the hand's spring equals the felt force and the device friction. At
+    # the lower end the felt force is the mean of both strokes, because the overshoot reverses the hysteresis.
     friction = device.coulomb_friction
     ends = sorted(
         (
-            x[first] + (at_rest[-1][first] - friction) / usual.stiffness,
+            x[first] + (at_rest.mean(axis=0)[first] - friction) / usual.stiffness,
             x[last] + (at_rest[0][last] + friction) / usual.stiffness,
         )
     )
@@ -276,17 +278,20 @@ def covered_text(plan: Plan, device: DeviceProfile, rendered: Recording) -> str:
     inside = max(0.0, min(high, upper) - max(low, lower)) / (upper - lower)
     reached = Unit.of_si(plan.model.units["position"]).interval(low, high)
     text = f"{reached}, {100.0 * inside:.3g} % of the domain"
-    _, _, at_rest = plan.forces_at_rest()
-    if np.abs(at_rest).max() <= _HELD_SHARE * device.force_limit:
-        return text
-    force_unit = Unit.of_si(plan.model.units["force"])
-    return (
-        f"{text}; the hand presses with at most {100.0 * _HELD_SHARE:g} % of the force limit of "
-        f"{force_unit.text(device.force_limit)}"
-    )
+    return f"{text}; {_held_text(plan, device)}" if _needed_limit(plan) > device.force_limit else text
 
 
-def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
+def _needed_limit(plan: Plan) -> float:
+    """Returns the force limit with which the simulated hand moves the handle through the whole domain."""
+    return plan.largest_at_rest / _HELD_SHARE
+
+
+def _held_text(plan: Plan, device: DeviceProfile) -> str:
+    limit = Unit.of_si(plan.model.units["force"]).text(device.force_limit)
+    return f"the hand presses with at most {100.0 * _HELD_SHARE:g} % of the force limit of {limit}"
+
+
+def judge(plan: Plan, rendered: Recording, error: ForceError, device: DeviceProfile | None = None) -> Verdict:
     """Judges a simulated rendering by its force error, its motion and its ticks.
 
     Parameters
@@ -297,7 +302,10 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         From :func:`simulate`.
     error : ForceError
         From :func:`force_error`.
+    device : DeviceProfile, optional
+        The simulated device. Default: that of the certificate of the plan, if it has one.
     """
+    device = plan.certificate.device if device is None and plan.certificate is not None else device
     status = Counter(rendered.columns["status"])
     ticks = len(rendered)
     if failed := status["NonFinite"]:
@@ -313,10 +321,15 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
     if lower == upper:
         findings.append(no("the handle did not move: simulate a longer time, or a stiffer hand"))
     elif covered < smallest_domain_share:
+        cure = "simulate a longer time"
+        if device is not None and (least := _needed_limit(plan)) > device.force_limit:
+            limit = rounded(math.ceil, least)
+            force_unit = Unit.of_si(plan.model.units["force"])
+            cure = f"{_held_text(plan, device)}, so use a device of at least {force_unit.text(limit)}"
         findings.append(
             usable(
                 f"the handle covered {100 * covered:.3g} % of the model's domain, at least "
-                f"{100 * smallest_domain_share:.3g} % are needed: simulate a longer time"
+                f"{100 * smallest_domain_share:.3g} % are needed: {cure}"
             )
         )
     span = force_range(plan)

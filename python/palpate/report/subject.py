@@ -149,7 +149,7 @@ class Subject:
         except InputError as error:
             return str(error)
         error_of = force_error(self.plan, rendered)
-        return Rendering(rendered, error_of, judge(self.plan, rendered, error_of))
+        return Rendering(rendered, error_of, judge(self.plan, rendered, error_of, device))
 
     @property
     def no_plan(self) -> str:

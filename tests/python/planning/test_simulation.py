@@ -26,8 +26,10 @@ from palpate.planning import (
     force_at,
     force_error,
     hand_for,
+    judge,
     rig_for,
 )
+from palpate.planning.device_profile import find_profile
 from palpate.planning.simulation import covered_text
 
 
@@ -250,3 +252,33 @@ def test_the_hand_stops_where_the_device_does_not_hold_the_force() -> None:
     assert 0.7 * 2.0 < rendered.force.max() < 2.0
     text = covered_text(chosen, weak, rendered)
     assert text.endswith("the hand presses with at most 80 % of the force limit of 2 N*m")
+
+
+def test_the_first_pull_of_the_hand_stays_inside_the_domain_of_a_stiff_object_with_hysteresis() -> None:
+    """The handle starts at 0, in the middle of the domain of an object that is pressed and pulled."""
+    model = model_by_hand(
+        weight=[0.0], linear=[18.0], lower=[-0.17], upper=[0.2], play_radius=0.012,
+        weight_hysteresis=[0.0], linear_hysteresis=[0.0], bias_hysteresis=0.45,
+    )  # fmt: skip
+    device = find_profile("bench-knob")
+    chosen = plan(model, device)
+    rendered = simulate(chosen, device, hand_for(chosen, device), 4.0)
+    assert rendered.columns["extrapolated"].mean() < 0.005
+    assert np.ptp(rendered.position) > 0.9 * (0.2 + 0.17)
+    assert not judge(chosen, rendered, force_error(chosen, rendered)).findings
+
+
+def test_more_time_is_no_cure_for_a_hand_that_the_device_cannot_hold() -> None:
+    """A wall of 40 N*m/rad needs 20 N*m at 0.5 rad, and the hand stops at 80 % of 1 N*m."""
+    weak = DeviceProfile(coulomb_friction=0.02, force_limit=1.0)
+    by_hand = Plan(model_by_hand(weight=[0.0], linear=[40.0]), Scheme(structure="direct"))
+    rendered = simulate(by_hand, weak, hand_for(by_hand, weak), 4.0)
+    (sentence,) = judge(by_hand, rendered, force_error(by_hand, rendered), weak).reasons
+    assert sentence.endswith(
+        "are needed: the hand presses with at most 80 % of the force limit of 1 N*m, so use a device of at "
+        "least 25 N*m"
+    )
+    strong = DeviceProfile(coulomb_friction=0.02, force_limit=30.0)
+    short = simulate(by_hand, strong, hand_for(by_hand, strong), 0.1)
+    (sentence,) = judge(by_hand, short, force_error(by_hand, short), strong).reasons
+    assert sentence.endswith("are needed: simulate a longer time")
