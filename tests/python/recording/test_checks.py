@@ -110,6 +110,24 @@ def test_a_reversed_sign_is_reported_and_the_correct_sign_has_no_finding(
     assert sentences(right) == []
 
 
+def late_spring(lag_s: float) -> Rows:
+    """Returns rows of a spring that a hand presses twice, with a late force."""
+    time = 0.005 * np.arange(800.0)
+    x = 0.5 - 0.5 * np.cos(np.pi * time)
+    return Rows(0.01 * x, np.interp(time - lag_s, time, 3.0 * x), time, None, {"position": "m", "force": "N"})
+
+
+def test_a_release_above_the_press_that_no_hand_notices_is_not_reported() -> None:
+    """A lag of 5 ms raises the release by 1.3 % of the largest force."""
+    assert sentences(late_spring(0.005)) == []
+
+
+def test_a_force_that_rises_has_no_reversed_sign() -> None:
+    sentence = only_sentence(late_spring(0.04))
+    assert "above that on press; a passive object cannot do that: if the force was recorded late" in sentence
+    assert "--negate" not in sentence
+
+
 def test_a_delay_is_named_as_a_cause_only_with_time() -> None:
     with_time = rows_of("sweeps")
     reversed_force = replace(with_time, f=-with_time.f)

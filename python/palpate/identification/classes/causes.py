@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ..data.rows import Rows
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.separable import TINY
 from ..options import SearchOptions
-from ..search.evidence import LEAST_GAIN, deviance
+from ..search.evidence import deviance
 from .dynamics import LEAST_SPEED_SPREAD, friction_sign, spread_of_speeds
 
 PLACES = 100
@@ -130,19 +131,24 @@ class Cause:
     """Change of the force by it, without its random part, in just noticeable differences"""
 
     @property
-    def clear(self) -> bool:
-        return self.share >= LEAST_GAIN
+    def perceptible(self) -> bool:
+        return self.noticed > 1.0
 
 
 @dataclass(frozen=True)
 class _Strokes:
-    """Rows of strokes, to compare those in the same direction over the same place."""
+    """Rows of strokes, to compare those in the same direction over the same place.
+
+    The mean of the rows of a stroke at a place counts once: the rows of a slow stroke are not independent.
+    """
 
     best: Judged
     rows: NDArray[np.intp]
     """(k,) indices of the rows with a weight"""
     weight: Float1D
     """(k,)"""
+    passage: NDArray[np.intp]
+    """(k,) number of the passage of a stroke through a place, of m passages"""
     group: NDArray[np.intp]
     """(k,) number of the place and the direction"""
     number: NDArray[np.intp]
@@ -167,6 +173,7 @@ class _Strokes:
             best,
             rows,
             best.weight[rows],
+            np.unique(number * 2 * PLACES + group, return_inverse=True)[1],
             group,
             number,
             every[edges][number],
@@ -179,7 +186,8 @@ class _Strokes:
         data = self.best.data
         x = data.path[:, 0]
         low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
-        place = np.floor(x[self.rows] * PLACES)  # wholly within the earlier strokes, or not
+        revolution = np.rint(x - data.box[:, 0])[self.rows]
+        place = revolution * PLACES + self.group % PLACES  # wholly within the earlier strokes, or not
         again = ((low * PLACES <= place) & (place + 1.0 <= high * PLACES)).astype(float)
         yield FIRST, again, 1.0, [again]
         if data.parts:
@@ -194,15 +202,38 @@ class _Strokes:
             if spread_of_speeds(moving) >= LEAST_SPEED_SPREAD:
                 speed = np.abs(moving)
                 yield FASTER, speed, float(np.ptp(speed)), [speed, np.abs(friction_sign(moving))]
-        turn = x[self.begin]
-        if (moved := float(np.ptp(self.centred(turn)))) > TURN_SHARE:
-            yield TURNED, turn, moved, [turn]
+        ends = x[self.begin], x[np.maximum(self.begin - 1, 0)]  # before and behind the turn
+        press = self.group < PLACES
+        turn = np.where(press, np.minimum(*ends), np.maximum(*ends))
+        moved = [float(np.ptp(self.centred(turn * side))) for side in (press, ~press)]
+        turn = turn * np.where(press, *(each > TURN_SHARE for each in moved))
+        if turn.any():
+            yield TURNED, turn, max(moved), [turn]
         middle = 0.5 * (self.begin + self.end) / len(x)
         yield LATER, middle, 1.0, [middle]
 
+    @cached_property
+    def first(self) -> NDArray[np.intp]:
+        """(m,) index of the first row of each passage"""
+        return np.unique(self.passage, return_index=True)[1]
+
+    @cached_property
+    def share(self) -> Float1D:
+        """(m,) mean weight of the rows of each passage"""
+        return np.bincount(self.passage, self.weight) / np.bincount(self.passage)
+
     def centred(self, values: Float1D) -> Float1D:
-        """Returns values (k,) minus their weighted mean at each place and direction."""
-        return values - means_at(self.group, self.weight, values)[0][self.group]
+        """Returns the weighted means (m,) of values (k,) in each passage, minus their weighted mean at each
+        place and direction."""
+        mean = np.bincount(self.passage, self.weight * values) / np.bincount(self.passage, self.weight)
+        place = self.group[self.first]
+        return np.asarray(mean - means_at(place, self.share, mean)[0][place])
+
+    def within(self, weighted: Float1D) -> Float1D:
+        """Returns weighted values (m,) without the weighted mean of each stroke."""
+        root, stroke = np.sqrt(self.share), np.unique(self.number[self.first], return_inverse=True)[1]
+        mean = np.bincount(stroke, root * weighted) / np.bincount(stroke, self.share)
+        return weighted - root * mean[stroke]
 
 
 def cause_of(best: Judged) -> Cause | None:
@@ -215,17 +246,18 @@ def cause_of(best: Judged) -> Cause | None:
     data = best.data
     if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
         return None
-    root, way = np.sqrt(strokes.weight), strokes.group // PLACES
+    root, way_of_row = np.sqrt(strokes.share), strokes.group // PLACES
+    way = way_of_row[strokes.first]
     force = (data.force - best.residual)[strokes.rows] / (np.abs(data.force).max() or 1.0)
     residual = root * strokes.centred(best.residual[strokes.rows])
     tables = []
     for sentence, value, span, functions in strokes.properties():
         scales = (1.0, force)
         if sentence != FIRST:
-            scales = tuple(scale * (way == side) for scale in scales for side in (0, 1))
+            scales = tuple(scale * (way_of_row == side) for scale in scales for side in (0, 1))
         columns = [root * strokes.centred(each * scale) for each in functions for scale in scales]
         sizes = np.array([float(np.linalg.norm(each)) for each in columns])
-        known = sizes > LEAST_MOMENT * float(np.linalg.norm(root * value))
+        known = sizes > LEAST_MOMENT * float(np.linalg.norm(value))
         if known.any():
             table = np.column_stack(columns)[:, known] / sizes[known]
             tables.append((sentence, value, span, table))
@@ -236,7 +268,8 @@ def cause_of(best: Judged) -> Cause | None:
     left = [float(np.sum((residual - effect) ** 2)) for effect in fits]
     noise = residual - fits[int(np.argmin(left))]
     free = len(residual) - len(np.unique(strokes.group)) - max(each.shape[1] for *_, each in tables)
-    n = free * (1.0 - max(neighbour_correlation(noise), 0.0))
+    # A difference between whole strokes is not noise.
+    n = free * (1.0 - max(neighbour_correlation(strokes.within(noise)), 0.0))
     if n < 1.0:
         return None
     floor, found = best.floor or 1.0, []
@@ -255,7 +288,7 @@ def cause_of(best: Judged) -> Cause | None:
         text = sentence.format(way_of_change, amount, pinched=best.pinched, speed=speed)
         criterion = deviance("bic", max(rss, TINY * before), n, table.shape[1])
         found.append((criterion, Cause(text, sentence == FASTER, 1.0 - rss / before, noticed)))
-    found = [each for each in found if each[1].noticed > 1.0] or found
+    found = [each for each in found if each[1].perceptible] or found
     least = min(criterion for criterion, _ in found)
     if least >= deviance("bic", before, n, 0):
         return None

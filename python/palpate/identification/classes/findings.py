@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
@@ -123,10 +124,11 @@ def _more_inputs(timed: bool, directed: bool) -> str:
     return f"record {' or '.join(missing)} as columns, and identify different objects or places separately"
 
 
-def wait_findings(best: Candidate) -> list[Finding]:
+def wait_findings(best: Candidate, left: NDArray[np.bool_]) -> list[Finding]:
     """Returns a finding if the force at rows that are not fitted differs much from the model.
 
-    Between press and release any force is possible, and a position within its noise. Relaxation, creep and
+    Between press and release any force is possible, and a position within its noise. At rows that are `left`
+    (n,), outside a domain whose end the tool leaves, the force is at most that inside. Relaxation, creep and
     drift are named only if the force of most rows differs from that of the first of successive rows: the last
     one can be the first of the next stroke.
     """
@@ -140,6 +142,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
         near = np.clip(box + shift, 0.0, 1.0)
         middle, half = best.parts_at(near) if best.strokes is not None else (best.force_near(near), 0.0)
         low, high = np.minimum(low, middle - half), np.maximum(high, middle + half)
+    low, high = np.where(left[unused], (low.clip(max=0.0), high.clip(min=0.0)), (low, high))
     outside = np.maximum(force - high, low - force).clip(min=0.0)
     error = float(np.sqrt(np.mean(outside**2)))
     if error <= USABLE_NRMSE * best.error.spread:
@@ -197,12 +200,7 @@ def place_findings(best: Judged) -> list[Finding]:
     stroke = "" if best.side is None else (" of the release" if worst >= places else " of the press")
     middle, unit = (worst % places + 0.5) / places, data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
-    cause = cause_of(best)
-    reason = (
-        cause.sentence
-        if cause is not None and cause.clear
-        else f"the force there depends on more than {best.inputs}, such as earlier motion: {more}"
-    )
+    reason = f"the force there depends on more than {best.inputs}, such as earlier motion: {more}"
     if best.hysteresis is not None and best.passive:
         loop = (
             2.0 * best.hysteresis(np.array([[middle]]))[0]
@@ -225,26 +223,28 @@ def place_findings(best: Judged) -> list[Finding]:
 
 def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     """Returns what changes in a model without the shift of press against release that the rows show; None
-    without such a shift, or if it changes less than the error on the rows."""
+    without such a shift, or if it changes less than the error on the rows. The change is that at the places
+    and directions of the rows."""
     best = selection.best
     if (shift := shift_of(selection, best)) is None:
         return None
-    box, data, unit = np.linspace(0.0, 1.0, COMPARED_POSITIONS)[:, None], best.data, best.data.force_unit
+    data, unit, weight = best.data, best.data.force_unit, best.settled.weight
+    box, side = data.box, np.zeros(len(weight)) if best.strokes is None else best.strokes.side
     (middle, half), (true_middle, true_half) = (
         each.parts_at(box) if best.strokes is not None else (each.force_near(box), 0.0)
         for each in (best, shift.without)
     )
-    force = np.concatenate([true_middle + true_half, true_middle - true_half])
-    apart = np.concatenate([middle + half, middle - half]) - force
-    place = places_of(np.tile(box, (2, 1)), np.repeat([1.0, -1.0], COMPARED_POSITIONS))
-    mean_apart, mean_force = means_at(place, np.ones(len(place)), apart, force)
+    force = true_middle + side * true_half
+    place = places_of(box, side)
+    mean_apart, mean_force = means_at(place, weight, middle + side * half - force, force)
     worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
-    rms, spread = float(np.sqrt(np.mean(apart**2))), best.error.spread or 1.0
-    perceptible = worst > MOST_JND or max(rms, best.settled.rmse) > USABLE_NRMSE * spread
+    rms = float(np.sqrt(np.mean(mean_apart[np.unique(place[weight > 0.0])] ** 2)))
+    spread, explained = best.error.spread or 1.0, 2.0 * shift.without.rmse**2 <= shift.before**2
+    perceptible = max(rms, best.settled.rmse * explained) > USABLE_NRMSE * spread or worst > MOST_JND
     if not perceptible and rms < best.error.rmse:
         return None
     amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
-    if shift.late and 2.0 * shift.without.rmse**2 <= shift.before**2:
+    if shift.late and explained:
         amount, lag_s = f"a force that is about {1e3 * shift.amount:.3g} ms late", shift.amount
     elif shift.late:  # the lag is not the only cause of the error, and its correction can raise it
         amount = "a late force"
@@ -290,7 +290,7 @@ def drift_findings(best: Judged) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
     noticeable difference. One press and release cannot show this."""
     cause = cause_of(best)
-    return [usable(cause.sentence)] if cause is not None and cause.noticed > 1.0 else []
+    return [usable(cause.sentence)] if cause is not None and cause.perceptible else []
 
 
 def _floor(best: Candidate) -> float:
@@ -404,7 +404,10 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
     settled = _judged_error(best, options.search.contact_share)
-    findings += wait_findings(best) + _of_reversal(best, settled)
+    (below, first), (above, last) = (_outside(best, options, into) for into in (1.0, -1.0))
+    box = data.box[:, 0]
+    left = ((box < first) & (below == "free")) | ((box > 1.0 - last) & (above == "free"))
+    findings += wait_findings(best, left) + _of_reversal(best, settled)
     judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
     shift = effect_of_shift(selection)
@@ -423,7 +426,6 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             f"NRMSE {error.nrmse:.2g} on all rows, {settled.nrmse:.2g} with these weights."
         )
     band, checked = band_with_check(best)
-    (below, first), (above, last) = (_outside(best, options, into) for into in (1.0, -1.0))
     return replace(
         network,
         below=below,

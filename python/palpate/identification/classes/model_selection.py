@@ -154,7 +154,7 @@ class Velocity(ModelClass):
         damped = moving is not None and moving.mass is None
         residual = below.static_force - below.force_at()
         cause = cause_of(judged_candidate(below))
-        if cause is None or not (cause.of_speed and cause.clear and cause.noticed > 1.0):
+        if cause is None or not (cause.of_speed and cause.perceptible and cause.share >= LEAST_GAIN):
             if not (damped or below.settled.nrmse > USABLE_NRMSE):
                 return below
             if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...verdict import FORCE_FLOOR, Finding, no, usable
+from ...verdict import FORCE_FLOOR, Finding, force_jnd, no, usable
 from ..contact import air_rows
-from ..conversion import mirror_notes
+from ..conversion import FALLING_CORRELATION, mirror_notes
 from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S
 from ..rows import along
 from .cells import LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
@@ -45,17 +45,22 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
     cells, is_loop, x, f = checked.cells, False, recording.position, recording.force
     if cells is not None and len(cells.loop) >= 4:
         mean = float(np.mean(cells.loop))
-        large = abs(mean) > FORCE_FLOOR * float(np.abs(f).max())
-        is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
+        jnd = force_jnd(0.5 * (cells.press + cells.release), FORCE_FLOOR * float(np.abs(f).max()) or 1.0)
+        noticed = abs(float(np.mean(cells.loop / jnd))) > 1.0
+        is_loop = noticed and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
     if is_loop and mean < 0.0:
-        is_late = _lag_of(recording, -mean) <= LONGEST_LAG_S
-        late = "; if the force was recorded late, give its delay, --force-late-s SECONDS" if is_late else ""
+        causes = []
+        if _lag_of(recording, -mean) <= LONGEST_LAG_S:
+            causes.append("if the force was recorded late, give its delay, --force-late-s SECONDS")
+        # With a reversed sign, a force that rises over the whole file would fall.
+        if not float(np.corrcoef(x, f)[0, 1]) > -FALLING_CORRELATION:
+            causes.append("if a sign is reversed, give --negate force or --negate position")
+        causes.append("if the zero of the force moved or a stroke has the wrong sign, record again")
+        causes.append("for a latch or a stored spring, give --no-hysteresis-nonnegative")
         return [
             usable(
                 f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "
-                "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
-                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative; if "
-                "the zero of the force moved, record again"
+                f"on press; a passive object cannot do that: {'; '.join(causes)}"
             )
         ]
     if is_loop or checked.attracts or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):

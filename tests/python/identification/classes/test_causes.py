@@ -8,7 +8,10 @@ import pytest
 
 from imperfect import Array
 from palpate import Model, Recording, identify
+from palpate.identification.classes.causes import Judged, cause_of
 from palpate.identification.classes.dynamics import LEAST_SPEED_SPREAD, spread_of_speeds
+from palpate.identification.classes.findings import drift_findings, place_findings
+from palpate.identification.data.rows import Rows
 
 VELOCITY = ("position", "hysteresis")
 
@@ -77,3 +80,58 @@ def test_noise_of_the_position_at_a_turn_is_not_called_a_first_press(seed: int) 
     force = np.gradient(x, time) + 0.02 * x
     noise = random.normal(0.0, 3e-4, len(x)), random.normal(0.0, 0.004 * force.std(), len(x))
     assert identify(Recording.from_arrays(x + noise[0], force + noise[1])).verdict.level == "good"
+
+
+def test_a_row_at_rest_at_the_largest_position_belongs_to_the_last_place() -> None:
+    """One release and one press share no place in the same direction, so that no cause can be known."""
+    x = np.r_[np.linspace(1.0, 0.0, 180), np.linspace(0.0, 1.0, 181)[1:]]
+    force = np.r_[-np.ones(180), np.ones(179), 0.0] + 0.1 * x
+    assert model(0.01 * np.arange(360.0), x, force).verdict.level == "good"
+
+
+def test_rows_between_which_the_tool_turns_do_not_change_the_position_of_the_turn() -> None:
+    """Seven times faster, the row behind a turn is further from the turn."""
+    random, time = np.random.default_rng(2), 0.0025 * np.arange(1820.0)
+    way = np.where(time < 4.0, time, 4.0 + 7.3 * (time - 4.0))
+    x = 1.0 - np.abs(1.0 - way % 2.0)
+    force = 0.1 * x + np.where(way % 2.0 < 1.0, 1.0, -1.0) * np.where(time < 4.0, 1.0 / 7.3, 1.0)
+    noise = random.normal(0.0, 2e-5, len(x)), random.normal(0.0, 0.003, len(x))
+    found = identify(Recording.from_arrays(x + noise[0], force + noise[1], time=time))
+    assert "last turn" not in str(found.verdict)
+
+
+def judged(x: Array, residual: Array, side: Array) -> Judged:
+    rows = Rows(("position",), x[:, None], np.ones(len(x)) + residual)
+    return Judged(rows, residual, np.ones(len(x)), side, "position")
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_the_rows_of_a_slow_stroke_at_a_place_count_once(seed: int) -> None:
+    """The force differs at random between places of strokes; most rows are at the start, as with a hand."""
+    random = np.random.default_rng(seed)
+    press = np.r_[np.linspace(0.0, 0.02, 60, endpoint=False), np.linspace(0.02, 1.0, 200)]
+    x, stroke = np.tile(np.r_[press, press[::-1]], 4), np.repeat(np.arange(8), len(press))
+    place = np.minimum((100 * x).astype(np.intp), 99)
+    residual = 0.012 * random.normal(0.0, 1.0, (8, 100))[stroke, place]
+    residual += random.normal(0.0, 0.002, len(x))
+    assert cause_of(judged(x, residual, 1.0 - 2.0 * (stroke % 2))) is None
+
+
+def test_strokes_that_differ_as_a_whole_have_a_cause() -> None:
+    """The zero moves behind the fourth of six strokes; the error of a straight line over time is not noise."""
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)], 3)
+    stroke = np.arange(len(x)) // 200
+    residual = 0.05 * (stroke > 3) + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
+    cause = cause_of(judged(x, residual, 1.0 - 2.0 * (stroke % 2)))
+    assert cause is not None
+    assert cause.perceptible
+
+
+def test_a_place_is_not_explained_by_a_cause_that_a_hand_does_not_notice() -> None:
+    """The zero of the force moves by a tenth of a just noticeable difference."""
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 400), np.linspace(1.0, 0.0, 400)], 3)
+    residual = np.linspace(-5e-4, 5e-4, len(x)) + 0.2 * ((x > 0.5) & (x < 0.51))
+    found = judged(x, residual, np.tile(np.repeat([1.0, -1.0], 400), 3))
+    assert drift_findings(found) == []
+    (finding,) = place_findings(found)
+    assert "the force there depends on more than position" in finding.sentence

@@ -128,6 +128,18 @@ def test_a_force_that_pulls_in_no_row_does_not_pull_between_them() -> None:
     assert model.force(-8e-5, direction=1.0) == pytest.approx(0.0, abs=0.05)
 
 
+def test_waits_outside_the_domain_are_compared_with_the_force_that_the_model_has_there() -> None:
+    """The tool waits in air; between few rows before the contact a network has a force, its continuation has
+    none."""
+    u = np.r_[0.0, np.arange(0.0, 4.0, 1.0 / 30.0)]
+    x, press = 1.02 * (1.0 - np.abs(1.0 - u % 2.0)) - 0.02, np.where(u % 2.0 < 1.0, 1.0, -1.0)
+    pad = np.maximum(x, 0.0)
+    force = 50.0 * (0.4 * np.tanh(10.0 * pad) + 0.2 * pad + pad**5) * (1.0 + 0.2 * press)
+    force += np.random.default_rng(0).normal(0.0, 0.1, len(x))
+    recording = palpate.Recording.from_arrays(0.02 * x, force, time=0.05 * np.arange(float(len(x))))
+    assert palpate.identify(recording, inputs=("position", "hysteresis")).verdict.level == "good"
+
+
 def cycles(count: int, drift: float, side: bool = False) -> palpate.Recording:
     """Returns presses and releases of a wall, with a zero that moves evenly by `drift`."""
     x = np.tile(np.r_[np.linspace(0.0, 1.0, 40), np.linspace(1.0, 0.0, 40)], count)
