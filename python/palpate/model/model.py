@@ -27,6 +27,9 @@ from .band import Band
 from .model_display import frame_of, html_of
 from .model_file import Fit, PathStep, describe, memory_of, memory_record, terms_of, write_json
 
+_VALUES_KEY = "sha256_of_values"
+"""Key in the notes of a model file: SHA-256 of positions and forces of the recordings."""
+
 _HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
 
@@ -329,6 +332,8 @@ class Model(ForceModel):
         notes = dict(self.notes)
         if self.data.held_out_every:
             notes[_HELD_OUT_KEY] = self.data.held_out_every
+        if self.data.values_sha256:
+            notes[_VALUES_KEY] = self.data.values_sha256
         hysteresis_weights = self.weight_hysteresis, self.linear_hysteresis
         bounds, memory = self.slope_bounds, self.memory
         return {
@@ -392,7 +397,8 @@ class Model(ForceModel):
         network, domain, continuation = (file.pop(part) for part in ("network", "domain", "continuation"))
         bounds, fit, data = (file.pop(part) for part in ("slope_bounds", "fit", "data"))
         band = file.pop("band", None)
-        held_out_every = file.get("notes", {}).get(_HELD_OUT_KEY, 0)
+        notes = file.get("notes", {})
+        held_out_every, values = notes.get(_HELD_OUT_KEY, 0), notes.get(_VALUES_KEY, "")
         return cls(
             **file,
             **{name: value for name, value in network.items() if name != "dimension"},
@@ -408,6 +414,7 @@ class Model(ForceModel):
                 rows=data["rows"],
                 columns=data["columns"],
                 held_out_every=held_out_every if type(held_out_every) is int else 0,
+                values_sha256=values if isinstance(values, str) else "",
             ),
         )
 

@@ -62,6 +62,9 @@ class Source:
     """True if the recording contains only held-out rows, False if it contains none of them."""
     file_rows: int = 0
     """Number of rows of the files, including rows that are not used; 0: not known."""
+    values_sha256: str = ""
+    """SHA-256 of the positions and forces of each file in SI units, which a copy in another format has too;
+    separated by spaces. Empty: not known."""
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
@@ -72,6 +75,7 @@ class Source:
             first,
             files=tuple(file for part in parts for file in part.files),
             sha256=" ".join(part.sha256 for part in parts),
+            values_sha256=" ".join(part.values_sha256 for part in parts).strip(),
             rows=sum(part.rows for part in parts),
             file_rows=sum(part.file_rows for part in parts) if all(part.file_rows for part in parts) else 0,
         )
@@ -413,6 +417,7 @@ def converted(
             rows=len(x),
             columns=names,
             file_rows=total,
+            values_sha256=digest_of(x, f),
         ),
         "notes": (conversion.note(torque_constant, table.notes), *notes),
         "file_units": file_units,

@@ -177,7 +177,13 @@ class Recording:
             columns={},
             metadata=_mapping("metadata", metadata),
             units=checked_units,
-            source=Source(files=(), sha256=digest_of(*arrays.values(), signs), rows=n, columns={}),
+            source=Source(
+                files=(),
+                sha256=digest_of(*arrays.values(), signs),
+                rows=n,
+                columns={},
+                values_sha256=digest_of(position, arrays["force"]),
+            ),
             notes=tuple(notes),
         )
 

@@ -389,7 +389,8 @@ def test_specimens_in_two_sheets_and_side_by_side_are_different_data(tmp_path: P
 def test_one_part_is_identified_and_verified_with_another(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = workbook(tmp_path / "a.xlsx", {f"S{k}": [HEADER, *indent(0, 80)] for k in range(2)})
+    other = [[time, travel, force + 1e-3] for time, travel, force in indent(0, 80)]
+    path = workbook(tmp_path / "a.xlsx", {"S0": [HEADER, *indent(0, 80)], "S1": [HEADER, *other]})
     model = tmp_path / "m.json"
     assert main(["identify", str(path), "--part", "S0", "-o", str(model)]) == 0
     assert main(["verify", str(model), str(path), "--part", "S1"]) == 0

@@ -408,6 +408,38 @@ def test_a_copied_file_is_not_fresh(tmp_path: Path) -> None:
     assert not verify(model_of(read_recording(path).source), read_recording(copy)).fresh
 
 
+def file_of(recording: Recording, path: Path, time: str) -> Path:
+    """Writes a recording in deg and mN*m, with the numbers of its rows as times in a column of this name."""
+    rows = zip(np.arange(len(recording)), np.degrees(recording.position), 1e3 * recording.force, strict=True)
+    text = "".join(f"{number},{angle:.6f},{torque:.6f}\n" for number, angle, torque in rows)
+    path.write_text(f"{time},angle_deg,torque_mNm\n{text}", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", ["again.csv", "again.mcap"])
+def test_a_recording_that_is_saved_again_is_not_fresh(name: str, tmp_path: Path) -> None:
+    whole = read_recording(file_of(curve(), tmp_path / "a.csv", "time_ms"))
+    model = load_model(model_of(whole.source).save(tmp_path / "a.json"))
+    again = read_recording(whole.write(tmp_path / name))
+    assert again.source.sha256 != whole.source.sha256
+    assert not verify(model, again).fresh
+    assert not verify(model, whole.position, whole.force).fresh
+    assert verify(model, whole.position, whole.force + 1e-6).fresh
+
+
+def test_a_model_without_the_digest_of_the_values_is_compared_by_the_file(tmp_path: Path) -> None:
+    whole = read_recording(curve().write(tmp_path / "a.csv"))
+    content = model_of(whole.source).to_dict()
+    assert content["notes"].pop("sha256_of_values") == whole.source.values_sha256
+    assert not verify(Model.from_dict(content), whole).fresh
+
+
+def test_a_time_that_is_not_read_does_not_change_a_verification(tmp_path: Path) -> None:
+    recording = read_recording(file_of(curve(), tmp_path / "a.csv", "t"))
+    assert "is not read as time" in recording.unread_time
+    assert verify(model_of(stroke().source), recording).verdict.level == "good"
+
+
 @cache
 def of_a_sample() -> Model:
     return identify(sample_recording(1, 2.0))
