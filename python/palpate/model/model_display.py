@@ -11,7 +11,7 @@ from .._typing import Float1D
 from ..frames import pd
 from ..html_table import Curve, html_table
 from ..recording.units import COLUMN_SUFFIX, Unit, split_name
-from .model_file import phases_of
+from .model_file import fitted_rows, phases_of
 
 if TYPE_CHECKING:
     from .model import Model
@@ -58,7 +58,7 @@ def html_of(model: Model) -> str:
     fit, data = model.fit, model.data
     rows = {
         "model": f"{model.kind}, {model.terms}, {model.n_parameters} parameters",
-        "error": f"NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(data.files) or 'arrays'}",
+        "error": f"NRMSE {fit.nrmse:.4g} on {fitted_rows(model)} of {', '.join(data.files) or 'arrays'}",
         "model class": f"{fit.model_class}, growth stopped by {fit.stop_reason}",
     }
     for k, name in enumerate(model.inputs):

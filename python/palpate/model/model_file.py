@@ -154,7 +154,8 @@ def describe(model: Model) -> str:
         *(f"  {reason}" for reason in model.verdict.reasons),
         f"{model.kind} model: {model.terms}, {model.n_parameters} parameters "
         f"(model class {fit.model_class}, stopped by {fit.stop_reason})",
-        f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(map(escaped, data.files)) or 'arrays'}",
+        f"  NRMSE {fit.nrmse:.4g} on {fitted_rows(model)} of "
+        f"{', '.join(map(escaped, data.files)) or 'arrays'}",
     ]
     if data.held_out_every:
         lines.append(f"  every {data.held_out_every}th row was held out")
@@ -185,6 +186,12 @@ def dynamics_of(model: Model) -> dict[str, str]:
     mass = {"m N": "kg", "rad N*m": "kg*m^2"}.get(f"{position} {force}", f"{force}*s^2/{position}")
     values = (("mass", model.mass, mass), ("damping", model.damping, f"{force}*s/{position}"))
     return {name: f"{value:.4g} {unit if known else ''}".rstrip() for name, value, unit in values if value}
+
+
+def fitted_rows(model: Model) -> str:
+    """Returns the rows with which the error of the fit was computed: "80 of 100 rows", or "100 rows"."""
+    fitted, rows = model.notes.get("error_rows"), model.data.rows
+    return f"{fitted} of {rows} rows" if isinstance(fitted, int) and fitted < rows else f"{rows} rows"
 
 
 def _band_lines(band: Band, units: Mapping[str, str]) -> list[str]:

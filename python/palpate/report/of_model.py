@@ -14,6 +14,7 @@ from .._core.model import wavelet_columns
 from .._typing import Float1D
 from ..identification.options import CHOICES
 from ..model import Model
+from ..model.model_file import fitted_rows
 from ..plotting.look import scale_for
 from .charts import CLASS_MARKS, Chart, Panel
 from .of_comparison import LINE_MARKS, at_rest
@@ -174,7 +175,7 @@ def provenance(subject: Subject) -> Section:
         ]
     facts["identified on"] = [
         *_files(data.files, data.sha256),
-        f"{data.rows} rows fitted"
+        f"{fitted_rows(model)} fitted"
         + (f"; every {data.held_out_every}th row was held out" if data.held_out_every else ""),
         *_columns(data.columns),
     ]

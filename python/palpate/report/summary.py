@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from ..identification.classes.findings import USABLE_NRMSE
+from ..model.model_file import fitted_rows
 from .of_comparison import Compared
 from .page import KeyNumber, Section, Table
 from .subject import Subject
@@ -50,7 +51,7 @@ def _fit_error(subject: Subject) -> KeyNumber:
         percent(subject.model.fit.nrmse),
         "error (NRMSE) of the fit",
         "The RMS force error as a share of the spread of the recorded force, on "
-        f"{subject.model.data.rows} rows of the identification. A good model has at most "
+        f"{fitted_rows(subject.model)} of the identification. A good model has at most "
         f"{percent(USABLE_NRMSE)}.",
     )
 

@@ -306,6 +306,7 @@ def test_the_text_of_a_model_names_terms_domain_and_error() -> None:
     text = str(Model(**content(hysteresis=True, play_radius=1e-4, wavelets=2)))
     assert "hysteresis model: 2 wavelets, 8 parameters (model class network, stopped by bic)" in text
     assert "NRMSE 0.001 on 100 rows of a.csv" in text
+    assert "NRMSE 0.001 on 80 of 100 rows of a.csv" in str(Model(**content(notes={"error_rows": 80})))
     assert "position from 0 to 0.6 m" in text
     assert "play radius 0.0001 m" in text
     assert "f(x, s) = g(x) + s h(x)  [N]" in text
