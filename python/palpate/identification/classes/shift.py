@@ -12,11 +12,11 @@ import numpy as np
 import scipy
 
 from ..._typing import Float1D
-from ...recording.motion import LONGEST_LAG_S
+from ...recording.motion import LONGEST_LAG_S, noise_of
 from ..data.strokes import HysteresisInput
 from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution
-from ..search.evidence import Candidate, Samples, criterion_of
+from ..search.evidence import LEAST_GAIN, Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
 from .repeatability import left_out_residual
 
@@ -54,7 +54,8 @@ def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     x - s d/2, with the direction s; a force that is late by t shows that at x(time - t). Where the force
     rises, the press is then below the release, which a passive object excludes. If a hysteresis of any sign
     lowers BIC as much as a model class must, and the squared error by more than the force between rows adds
-    to it, the wavelets of the model are refined on moved rows.
+    to it, the wavelets of the model are refined on moved rows. The shift must explain a quarter of the
+    squared error that is not noise, as velocity must.
     """
     if selection.shifted is None or selection.shifted[0] is not best:
         selection.shifted = best, _shift_of(selection, best)
@@ -111,6 +112,7 @@ def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
         ).x
     )
     without = at(moved(amount, late))
-    if unmoved.rmse**2 - without.rmse**2 < 0.5 * explained:
+    structured = max(unmoved.rmse**2 - noise_of(data.force) ** 2, 0.0)
+    if unmoved.rmse**2 - without.rmse**2 < max(0.5 * explained, LEAST_GAIN * structured):
         return None
     return Shift(amount, late, unmoved.rmse, without)

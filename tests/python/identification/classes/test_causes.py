@@ -118,7 +118,7 @@ def test_the_rows_of_a_slow_stroke_at_a_place_count_once(seed: int) -> None:
 
 
 def test_strokes_that_differ_as_a_whole_have_a_cause() -> None:
-    """The zero moves behind the fourth of six strokes; the error of a straight line over time is not noise."""
+    """The zero moves behind the fourth of six strokes, which a straight line over time does not explain."""
     x = np.tile(np.r_[np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)], 3)
     stroke = np.arange(len(x)) // 200
     residual = 0.05 * (stroke > 3) + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
