@@ -461,8 +461,10 @@ class Plan:
 
     @property
     def _force_limit(self) -> float:
-        """Force limit of the device; infinity without a device"""
-        return math.inf if self.certificate is None else self.certificate.device.force_limit
+        """Force limit of the device; infinity without a device, and for an admittance display, which holds a
+        position against any force"""
+        device = None if self.certificate is None else self.certificate.device
+        return math.inf if device is None or device.admittance is not None else device.force_limit
 
     def _unlimited_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
         x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
