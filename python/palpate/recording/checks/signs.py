@@ -46,8 +46,8 @@ def reversed_sign(checked: Checked, *, same_sign_share: float) -> list[Finding]:
     if cells is not None and len(cells.loop) >= 4:
         mean = float(np.mean(cells.loop))
         jnd = force_jnd(0.5 * (cells.press + cells.release), FORCE_FLOOR * float(np.abs(f).max()) or 1.0)
-        noticed = abs(float(np.mean(cells.loop / jnd))) > 1.0
-        is_loop = noticed and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
+        large = abs(float(np.mean(cells.loop / jnd))) > 1.0
+        is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
     if is_loop and mean < 0.0:
         causes = []
         if _lag_of(recording, -mean) <= LONGEST_LAG_S:
