@@ -643,9 +643,9 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
     return _static_error(x, strokes(identified, x), _at_rest(rendered, scheme, x))
 
 
-def _static_error(x: Float1D, wanted: Float2D, felt: Float2D) -> StaticForceError:
-    """Returns the error of the felt force (k, n) at positions (n,)."""
-    error = felt - wanted
+def _static_error(x: Float1D, wanted: Float2D, rendered: Float2D) -> StaticForceError:
+    """Returns the error of the rendered force (k, n) at positions (n,)."""
+    error = rendered - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
         largest,

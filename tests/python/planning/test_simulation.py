@@ -268,7 +268,7 @@ def test_the_first_pull_of_the_hand_stays_inside_the_domain_of_a_stiff_object_wi
     assert not judge(chosen, rendered, force_error(chosen, rendered)).findings
 
 
-def test_more_time_is_no_cure_for_a_hand_that_the_device_cannot_hold() -> None:
+def test_a_hand_that_the_device_cannot_hold_needs_a_stronger_device_and_not_more_time() -> None:
     """A wall of 40 N*m/rad needs 20 N*m at 0.5 rad, and the hand stops at 80 % of 1 N*m."""
     weak = DeviceProfile(coulomb_friction=0.02, force_limit=1.0)
     by_hand = Plan(model_by_hand(weight=[0.0], linear=[40.0]), Scheme(structure="direct"))
