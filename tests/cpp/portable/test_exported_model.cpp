@@ -224,11 +224,13 @@ TEST(ExportedModel, OtherStructuresAndModelsAreRefusedWithTheCure) {
         return scheme;
     };
     EXPECT_EQ(refusal(position, with(StructureKind::Direct), target), "");
-    EXPECT_EQ(refusal(position, with(StructureKind::Implicit), target),
-              "the structure implicit is not exported: plan the model with --structure direct or massless");
+    EXPECT_EQ(
+        refusal(position, with(StructureKind::Implicit), target),
+        "the structure implicit is not exported: plan the model without mass and damping, with --mass 0 "
+        "--object-damping 0");
     EXPECT_EQ(refusal(hysteresis, with(StructureKind::Massless), target),
-              "the structure massless is not exported for a model with hysteresis: plan the model with "
-              "--structure direct");
+              "the structure massless is not exported for a model with hysteresis: plan the model "
+              "without --coupling");
     EXPECT_NE(refusal(position, with(StructureKind::Direct), {0.0, 0.0}).find("--encoder-step"),
               std::string::npos);
     EXPECT_NE(

@@ -157,13 +157,14 @@ class ExportedModel {
         const std::string structure{name_of(scheme.structure)};
         if (scheme.structure != StructureKind::Direct && scheme.structure != StructureKind::Massless) {
             refuse("the structure " + structure +
-                   " is not exported: plan the model with --structure direct or massless");
+                   " is not exported: plan the model without mass and damping, with --mass 0 "
+                   "--object-damping 0");
         }
         if (scheme.structure == StructureKind::Massless) {
             if (model.hysteresis() != nullptr) {
                 refuse(
-                    "the structure massless is not exported for a model with hysteresis: plan the model with "
-                    "--structure direct");
+                    "the structure massless is not exported for a model with hysteresis: plan the model "
+                    "without --coupling");
             }
             if (!(target.period_s > 0.0)) {
                 refuse("the structure massless needs the period of a device: plan the model for a device");
