@@ -390,6 +390,15 @@ def test_friction_and_adhesion_are_not_a_second_zero(clean: tuple[np.ndarray, np
     assert zero_sentences(*clean) == []
 
 
+def test_a_stop_that_pulls_in_both_strokes_is_not_a_second_zero() -> None:
+    press = np.linspace(0.0, 1.1, 800)
+    x = np.tile(np.r_[press, press[::-1]], 2)
+    stop = 0.6 * np.logaddexp(0.0, (0.03 - x) / 0.01)
+    f = 4.0 * x - stop + np.tile(np.repeat([0.1, -0.1], 800), 2)
+    f += np.random.default_rng(0).normal(0.0, 0.03, len(x))
+    assert zero_sentences(x, f) == []
+
+
 def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
     x, _ = contact()
     f = np.repeat([1.0, -1.0], 800) * (0.3 + 5.0 * x) + np.random.default_rng(0).normal(0.0, 1e-3, 1600)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...verdict import FORCE_FLOOR, Finding, force_jnd, no, usable
 from ..contact import air_rows
 from ..conversion import FALLING_CORRELATION, mirror_notes
-from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S
+from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S, directions_of
 from ..rows import along
 from .cells import LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
 
@@ -142,6 +142,12 @@ def moved_zero(checked: Checked, *, shift_share: float, range_share: float, rows
     held = float(np.median(cells.release)) < 0.0 or start > 0.5 * abs(end)
     if end > -shift or cells.press.min() < -shift or held:
         return []
+    # Rows of the press behind a turn are in no cell, and pull as those of the release before it.
+    direction = directions_of(recording)
+    if direction is not None:
+        into = np.flatnonzero(recording.motion.moving & (direction > 0))
+        if len(into) and _lowest_force(recording, into, rows) < -shift:
+            return []
     return [
         usable(
             f"the release ends at {recording.file_unit('force').text(end)}, but the press never pulls the "
