@@ -137,11 +137,14 @@ def wait_findings(best: Candidate, left: NDArray[np.bool_]) -> list[Finding]:
     if not len(unused) or best.error.spread == 0.0:
         return []
     box, force, band = data.box[unused], best.static_force[unused], noise_band(data.path[:, 0])
-    low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
-    for shift in (-band, 0.0, band):
-        near = np.clip(box + shift, 0.0, 1.0)
-        middle, half = best.parts_at(near) if best.strokes is not None else (best.force_near(near), 0.0)
-        low, high = np.minimum(low, middle - half), np.maximum(high, middle + half)
+    parts = [
+        (best.force_near(near), 0.0) if best.strokes is None else best.parts_at(near)
+        for near in (np.clip(box + shift, 0.0, 1.0) for shift in (0.0, -band, band))
+    ]
+    # At an end of the travel the force beyond is not known: it changes there as much as inside.
+    (middle, half), (before, _), (behind, _) = parts
+    around = np.abs(half) + np.maximum(np.abs(before - middle), np.abs(behind - middle))
+    low, high = middle - around, middle + around
     low, high = np.where(left[unused], (low.clip(max=0.0), high.clip(min=0.0)), (low, high))
     outside = np.maximum(force - high, low - force).clip(min=0.0)
     error = float(np.sqrt(np.mean(outside**2)))

@@ -240,6 +240,15 @@ def test_waits_in_which_the_force_is_constant_are_not_called_relaxation() -> Non
         assert "relaxation" not in verdict
 
 
+def test_a_tool_that_is_held_at_a_stop_moves_within_a_step_of_the_position() -> None:
+    press = np.r_[np.arange(0.0, 7.25, 0.006), np.full(70, 7.25)]
+    x = np.tile(np.r_[press, press[::-1]], 2)
+    force = 0.18 * x + 0.9 * np.logaddexp(0.0, (x - 7.0) / 0.06)
+    force += np.random.default_rng(0).normal(0.0, 0.006, len(x))
+    model = palpate.identify(recorded(0.02 * np.round(x / 0.02), force))
+    assert "rows that are not fitted" not in str(model.verdict)
+
+
 def test_an_error_that_a_hand_does_not_feel_requires_no_more_wavelets() -> None:
     x = sweep(2000)
     rendered = palpate.identify(recorded(x, wall(x)), max_wavelets=4)
