@@ -313,6 +313,15 @@ def test_a_clean_steep_start_a_wall_and_a_click_have_no_wrong_reading() -> None:
     assert wrong_rows(PRESS, FORCE - 20.0 * (PRESS > 2.0)) == []
 
 
+@pytest.mark.parametrize("offset", [0.2, 0.5, 0.8])
+def test_a_single_peak_over_several_rows_has_no_wrong_reading(offset: float) -> None:
+    x = np.arange(-10.0, 150.0) + offset
+    glide = (8.5 + 3.0 * np.exp(-(((x - 3.0) / 2.0) ** 2))) * np.tanh(np.maximum(x, 0.0) / 1.2)
+    y = glide + np.random.default_rng(1).normal(0.0, 0.03, len(x))
+    assert wrong_rows(x, y) == []
+    assert wrong_rows(x, changed(y, {80: 11.0, 81: 11.1, 120: 0.0})) == [80, 81, 120]
+
+
 @pytest.mark.parametrize("rows", [10, 16])
 def test_few_rows_have_no_wrong_reading(rows: int) -> None:
     x = np.linspace(0.0, 4.0, rows)

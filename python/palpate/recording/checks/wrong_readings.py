@@ -80,10 +80,11 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby; one step of the display is not a wrong reading. Several of them side by side are outside
-    the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows
-    that are not in the order of a motion have no neighbours, and none is wrong. `motion` (m,) is the
-    position of all rows in recorded order, of which these rows can be a part.
+    row nearby; one step of the display is not a wrong reading, and no row of a peak over several rows is one.
+    Several of them side by side are outside the range of all others. At the largest and smallest positions a
+    wall may be touched by a single row. Rows that are not in the order of a motion have no neighbours, and
+    none is wrong. `motion` (m,) is the position of all rows in recorded order, of which these rows can be a
+    part.
 
     A residual (n,), the force minus that of a model, is compared in place of the values: it does not change
     along a steep part. It must also be far larger than the residuals of other strokes in the same direction
@@ -193,10 +194,22 @@ def _deviating(
             wrong[:NEIGHBOUR_ROWS] = wrong[-NEIGHBOUR_ROWS:] = False
         if wrong.any():
             wrong &= inner(rows, rows[~wrong])
+            wrong[wrong] = ~_of_a_peak(values[rows], wrong)
         if not wrong.any():
             break
         found[rows[wrong]] = True
     return found
+
+
+def _of_a_peak(values: Float1D, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Returns True (k,) for the k found rows (n,) to which the values (n,) rise and from which they fall over
+    several rows: they change the same ways just before and behind, in sum at least as much."""
+    changes = np.pad(np.diff(values), 2)
+    begin, end = np.flatnonzero(np.diff(found, prepend=False, append=False)).reshape(-1, 2).T
+    steps, around = changes[[begin + 1, end + 1]], changes[[begin, end + 2]]
+    peak = (np.sign(steps) == np.sign(around)).all(axis=0)
+    peak &= np.abs(steps).sum(axis=0) <= np.abs(around).sum(axis=0)
+    return np.asarray(np.repeat(peak, end - begin))
 
 
 def _apart(values: Float1D, count: int) -> Float1D:
