@@ -92,8 +92,10 @@ def verdict_of(
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows, and `attracts`
     is True if the object is stated to attract the tool."""
-    findings = [*findings_of(recordings, side, attracts), *network.log.findings]
     fitted, left_out = network.settled_nrmse
+    moving = network.damping is not None or network.memory is not None or "velocity" in network.inputs
+    explained = moving and max(fitted, left_out) <= USABLE_NRMSE
+    findings = [*findings_of(recordings, side, attracts, explained), *network.log.findings]
     rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""
     if not network.log.findings and fitted <= USABLE_NRMSE:

@@ -110,11 +110,15 @@ def quality_findings(recording: Recording, attracts: bool = False) -> list[Findi
 
 
 def findings_of(
-    recordings: Sequence[Recording], side: Float1D | None = None, attracts: bool = False
+    recordings: Sequence[Recording],
+    side: Float1D | None = None,
+    attracts: bool = False,
+    explained: bool = False,
 ) -> list[Finding]:
     """Returns findings on each recording, with its name if there are several, and on all of them together.
 
-    `side` (n,) is the direction of the rows of all recordings if they do not state it.
+    `side` (n,) is the direction of the rows of all recordings if they do not state it; `explained` is True if
+    one model explains the forces of all recordings by more than position and direction.
     """
     if len(recordings) == 1:
         return quality_findings(recordings[0], attracts)
@@ -127,4 +131,4 @@ def findings_of(
         for name, recording in zip(names, recordings, strict=True)
         for finding in quality_findings(recording, attracts)
     ]
-    return found + scale_findings(recordings, side)
+    return found if explained else found + scale_findings(recordings, side)
