@@ -560,35 +560,44 @@ def at_rows(
     return result, defined
 
 
-def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the velocity [position unit per second] of each row (n,) as an input, and True for rows that
-    have one (n,).
+def velocities(recordings: Sequence[Recording]) -> list[tuple[Float1D, NDArray[np.bool_]]]:
+    """Returns the velocity [position unit per second] of each row (n,) of each recording as an input, and
+    True for rows that have one (n,). All recordings have the same low-pass.
 
     Raises
     ------
     InputError
-        The recording has no time, or its position is too noisy or too short to differentiate.
+        A recording has no time, or the positions are too noisy or too short to differentiate.
     """
-    return _derivative(recording, 1, quiet_low_pass)
+    return _derivatives(recordings, 1, quiet_low_pass)
+
+
+def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Returns the :func:`velocities` of one recording."""
+    return velocities([recording])[0]
 
 
 def derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns the velocity (order 1) or acceleration (order 2) of each row (n,) with the least expected
     error, and True for rows that have one (n,).
 
-    It raises the same errors as :func:`velocity`.
+    It raises the same errors as :func:`velocities`.
     """
-    return _derivative(recording, order, least_error_low_pass)
+    return _derivatives([recording], order, least_error_low_pass)[0]
 
 
-def _derivative(
-    recording: Recording, order: int, choose: Callable[..., LowPass | None]
-) -> tuple[Float1D, NDArray[np.bool_]]:
-    parts = pieces(recording)
-    low_pass = choose(parts, order=order)
+def _derivatives(
+    recordings: Sequence[Recording], order: int, choose: Callable[..., LowPass | None]
+) -> list[tuple[Float1D, NDArray[np.bool_]]]:
+    parts = [pieces(recording) for recording in recordings]
+    low_pass = choose([part for each in parts for part in each], order=order)
     if low_pass is None:
         raise InputError(
-            f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from {len(recording)} rows: "
-            "the pieces between gaps in time are too short, or the noise of the position is too large"
+            f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from "
+            f"{sum(map(len, recordings))} rows: the pieces between gaps in time are too short, or the noise "
+            "of the position is too large"
         )
-    return at_rows(parts, low_pass, order, len(recording))
+    return [
+        at_rows(each, low_pass, order, len(recording))
+        for each, recording in zip(parts, recordings, strict=True)
+    ]

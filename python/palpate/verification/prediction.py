@@ -151,7 +151,7 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
     rows = np.ones(len(recording), dtype=bool)
     notes: tuple[str, ...] = ()
     if model.dimension > 1:
-        X, rows = input_columns(recording, model.inputs)
+        ((X, rows),) = input_columns([recording], model.inputs)
         if not rows.any():
             raise InputError(
                 "no row of the recording has a velocity, which the model needs: record a longer motion "

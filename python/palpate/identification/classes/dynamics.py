@@ -173,7 +173,10 @@ class Dynamics:
 
     def __init__(self, data: Rows, options: IdentifyOptions) -> None:
         parts = data.parts
+        self._terms: tuple[str, ...] = TERMS
         low_pass = quiet_low_pass(parts, order=2) if parts else None
+        if parts and low_pass is None:  # constant speeds have no acceleration
+            low_pass, self._terms = quiet_low_pass(parts, order=1), ("damping",)
         self._low_pass = low_pass or LowPass(1.0)
         self._parts = [] if low_pass is None else long_enough(parts, low_pass)
         self._data, self._evidence = data, options.search.evidence
@@ -198,7 +201,7 @@ class Dynamics:
         if regression is None:
             return {}, [Decision("damping", "not tested", SHORT_MOTION), self._mass_not_tested()]
         decisions: list[Decision] = []
-        allowed: tuple[str, ...] = TERMS
+        allowed = self._terms
         spread = spread_of_speeds(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
         if spread < LEAST_SPEED_SPREAD:
             reason = (
@@ -206,7 +209,9 @@ class Dynamics:
                 f"fast strokes with at least {100 * LEAST_SPEED_SPREAD:.2g} % are needed"
             )
             decisions.append(Decision("damping", "not tested", reason))
-            allowed = ("mass",)
+            allowed = tuple(name for name in allowed if name != "damping")
+        if "mass" not in self._terms:
+            decisions.append(self._mass_not_tested())
         criterion = self._criterion
         valued = {
             (use, names): regression.value(use, names, criterion) + self._evidence * (len(names) + use)

@@ -21,7 +21,7 @@ from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.contact import contact_at
-from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocity
+from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocities
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
 from ..data.rows import rows_of
@@ -542,8 +542,7 @@ class _Compared:
         moving = recorded.fitted(recorded.moving)
         balance = balanced(moving)
         if "velocity" in found.inputs:
-            derived = [velocity(part) for part in parts]
-            speed, known = (recorded.fitted(list(each)) for each in zip(*derived, strict=True))
+            speed, known = (recorded.fitted(list(each)) for each in zip(*velocities(parts), strict=True))
             share, outside = known.astype(float), np.zeros(len(force))
             residual = force - found.force(np.column_stack([position, speed]), None)
         elif found.residual is None or found.share is None or len(found.residual) != ends[-1]:

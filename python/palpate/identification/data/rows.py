@@ -16,7 +16,7 @@ from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS, Motion
-from ...recording.motion import Piece, gaps_of, ordered_strokes, pieces, resolution_of, velocity
+from ...recording.motion import Piece, gaps_of, ordered_strokes, pieces, resolution_of, velocities
 from ...recording.roles import Role, roles_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
@@ -269,7 +269,7 @@ def rows_of(
         A recording has no such input, or the inputs are hysteresis together with further inputs.
     """
     names = _input_names(recordings[0], options)
-    found = [input_columns(recording, names) for recording in recordings]
+    found = input_columns(recordings, names)
     kept = [rows for _, rows in found]
     columns = [X[rows] for X, rows in found]
     lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
@@ -368,25 +368,27 @@ def _goes_on(before: Motion, motion: Motion) -> bool:
     return len(before.time) not in gaps_of(time, position)
 
 
-def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Returns the named inputs (n, d) of a recording, and True (n,) for the rows that have all inputs.
+def input_columns(
+    recordings: Sequence[Recording], names: Sequence[str]
+) -> list[tuple[Float2D, NDArray[np.bool_]]]:
+    """Returns the named inputs (n, d) of each recording, and True (n,) for the rows that have all inputs.
 
     A velocity that is not a column of the recording is derived from its time.
 
     Raises
     ------
     InputError
-        The recording does not have a named input.
+        A recording does not have a named input.
     """
-    columns, rows = [], np.ones(len(recording), dtype=np.bool_)
-    for name in names:
-        if name == "velocity" and name not in recording.input_names:
-            derived, known = velocity(recording)
-            columns.append(derived)
-            rows &= known
-        else:
-            columns.append(_column(recording, name))
-    return np.column_stack(columns), rows
+    moving = [(np.empty(0), np.ones(len(each), dtype=np.bool_)) for each in recordings]
+    if "velocity" in names and not all("velocity" in each.input_names for each in recordings):
+        moving = velocities(recordings)
+    found = []
+    for recording, (speed, rows) in zip(recordings, moving, strict=True):
+        derived = "velocity" not in recording.input_names
+        columns = [speed if name == "velocity" and derived else _column(recording, name) for name in names]
+        found.append((np.column_stack(columns), rows))
+    return found
 
 
 def _column(recording: Recording, name: str) -> Float1D:

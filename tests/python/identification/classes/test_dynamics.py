@@ -288,6 +288,32 @@ def test_several_recordings_of_one_object_are_one_regression() -> None:
     assert model.damping == pytest.approx(0.06, rel=0.05)
 
 
+def presses(in_air: bool) -> list[Recording]:
+    """Returns presses of a damped spring at three constant speeds, from the contact or from the air."""
+    random, found = np.random.default_rng(0), []
+    for speed in (3.0, 10.0, 25.0):
+        x = np.arange(-2.4 if in_air else 0.0, 40.0, 0.01 * speed)
+        force = np.where(x < 0.0, 0.0, 0.1 * x + 0.2 * speed) + random.normal(0.0, 0.03, len(x))
+        found.append(Recording.from_arrays(x, force, time=0.01 * np.arange(len(x))))
+    return found
+
+
+def test_presses_at_constant_speeds_show_damping_without_an_acceleration() -> None:
+    model = identify(presses(in_air=False))
+    assert model.damping == pytest.approx(0.2, rel=0.01)
+    assert (model.mass, model.verdict.level) == (None, "good")
+    assert any(line.startswith("mass: not tested") for line in model.notes["model_selection"])
+
+
+@pytest.mark.parametrize("inputs", ["auto", ("position", "velocity")])
+def test_presses_that_are_too_short_alone_have_a_velocity_together(inputs: str | Sequence[str]) -> None:
+    """The damping acts in contact only, so that the velocity is an input."""
+    model = identify(presses(in_air=True), inputs=inputs)
+    assert model.kind == "position_velocity"
+    assert model.fit.nrmse < 0.05
+    assert model.verdict.level == "good"
+
+
 def test_low_pass_has_no_delay_and_keeps_slow_motion() -> None:
     low_pass, period = LowPass(100.0), 1e-3
     t = np.arange(4000) * period
