@@ -344,16 +344,17 @@ def _pulls(best: Candidate, near_zero: float, into: float) -> bool:
 def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
     """Returns the distance [box] from the end of the travel to the domain of a force that the tool can leave:
     0, or the end of a pull that no row shows. Between few rows before the contact a network can pull; its
-    continuation does not."""
+    continuation does not. It starts where both strokes are free: the rows before it have no force."""
     data = best.data
     box = data.box[data.fitted & (into * best.static_force > near_zero), 0]
     reached = float((box if into > 0.0 else 1.0 - box).min()) if len(box) else 0.0
     way = np.linspace(0.0, reached, COMPARED_POSITIONS)
     middle, half = best.parts_at((way if into > 0.0 else 1.0 - way)[:, None])
-    least = into * middle - np.abs(half)
+    least, most = into * middle - np.abs(half), into * middle + np.abs(half)
     if least.min() >= -_floor(best):
         return 0.0
-    return float(way[min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)])
+    end = min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)
+    return float(way[end]) if most[end] <= max(best.rmse, near_zero) else 0.0
 
 
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:

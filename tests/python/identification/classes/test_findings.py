@@ -240,6 +240,19 @@ def test_waits_in_which_the_force_is_constant_are_not_called_relaxation() -> Non
         assert "relaxation" not in verdict
 
 
+def test_the_domain_keeps_rows_that_are_recorded_without_force() -> None:
+    """The release of a syringe with friction pulls a little between few rows at the contact, where the press
+    is steep."""
+    x = np.linspace(-1.5, 40.0, 250)
+    x = np.r_[x, x[::-1]]
+    side, contact = np.repeat([1.0, -1.0], 250), np.tanh(np.maximum(x, 0.0) / 0.3)
+    seal = (3.5 + 3.0 * np.exp(-(((x - 0.8) / 0.5) ** 2))) * contact + 0.01 * x + 2.0 * side
+    force = np.where(x > 0.0, np.maximum(seal, 0.0), 0.0) + np.random.default_rng(0).normal(0.0, 0.03, len(x))
+    recording = palpate.Recording.from_arrays(x, force, direction=side)
+    model = palpate.identify(recording)
+    assert palpate.verify(model, recording).nrmse == pytest.approx(model.fit.nrmse, rel=0.01)
+
+
 def test_a_tool_that_is_held_at_a_stop_moves_within_a_step_of_the_position() -> None:
     press = np.r_[np.arange(0.0, 7.25, 0.006), np.full(70, 7.25)]
     x = np.tile(np.r_[press, press[::-1]], 2)
