@@ -184,6 +184,12 @@ class Dynamics:
         self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
+    @property
+    def accelerates(self) -> bool:
+        """True if the acceleration is known. Constant speeds have none, and do not show the force between
+        them."""
+        return "mass" in self._terms
+
     def accepted(
         self, basis: Basis, strokes: HysteresisInput | None
     ) -> tuple[dict[str, float], list[Decision]]:
@@ -210,7 +216,7 @@ class Dynamics:
             )
             decisions.append(Decision("damping", "not tested", reason))
             allowed = tuple(name for name in allowed if name != "damping")
-        if "mass" not in self._terms:
+        if not self.accelerates:
             decisions.append(self._mass_not_tested())
         criterion = self._criterion
         valued = {

@@ -94,7 +94,7 @@ def verdict_of(
     is True if the object is stated to attract the tool."""
     fitted, left_out = network.settled_nrmse
     moving = network.damping is not None or network.memory is not None or "velocity" in network.inputs
-    explained = moving and max(fitted, left_out) <= USABLE_NRMSE
+    explained = moving and max(fitted, left_out) <= UNFIT_NRMSE
     findings = [*findings_of(recordings, side, attracts, explained), *network.log.findings]
     rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""

@@ -139,7 +139,8 @@ class Velocity(ModelClass):
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
         """True if the recorded motion allows velocity as an input, and the model is not periodic."""
-        return selection.motion is not None and selection.data.period is None
+        motion = selection.motion
+        return motion is not None and motion.accelerates and selection.data.period is None
 
     def better(self, below: Candidate) -> Candidate:
         """Returns the network over position and velocity if the squared error decreases enough, else the
