@@ -10,5 +10,5 @@ def test_loops_that_narrow_at_their_middle_are_called_pinched(monkeypatch: pytes
     found = growing_loops.measured("Bouc-Wen, pinched", 4)
     assert found["verdict"] == "usable"
     assert found["nrmse"] < 0.25  # 0.38 without the largest play radius
-    assert "depends on the position of the last turn" in found["reason"]
+    assert "such as earlier motion" in found["reason"]
     assert "pinching" in found["reason"]

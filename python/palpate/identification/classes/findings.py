@@ -205,7 +205,9 @@ def place_findings(best: Judged) -> list[Finding]:
     stroke = "" if best.side is None else (" of the release" if worst >= places else " of the press")
     middle, unit = (worst % places + 0.5) / places, data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
-    reason = f"the force there depends on more than {best.inputs}, such as earlier motion: {more}"
+    reason = (
+        f"the force there depends on more than {best.inputs}, such as earlier motion{best.pinched}: {more}"
+    )
     if best.hysteresis is not None and best.passive:
         loop = (
             2.0 * best.hysteresis(np.array([[middle]]))[0]
