@@ -32,13 +32,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.identification.noise import CASES, line
 from bench.identification.ordinary import ALLOWED_RATIO, Truth, reported_error
 from bench.identification.ordinary_objects import Array
-from bench.identification.ordinary_recordings import drawn
+from bench.identification.ordinary_recordings import FIRST_PAIRS, PAIRS, Pair, drawn
 from bench.identification.problems import problem, spring_wall
 from bench.identification.real_data import EVERY, SETS
 from bench.studies import count, markdown_table, measured_data, write_results
 
 import palpate
 from palpate import InputError, Model, Recording
+from palpate._core.model import play
 from palpate.baselines import comparable
 from palpate.recording import checks
 from palpate.recording.checks import Check
@@ -55,8 +56,11 @@ FILES = 4
 LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
-SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 11611)
+SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 10952, 11611)
 """Draws that show a rule which other draws seldom show"""
+
+SHOWN_ADDED = (10924, 10925, 10938, 10953, 10985)
+"""The same among the draws with a further object or operator"""
 
 CHANGED_RATIO = 1.02
 """Ratio of two errors, of the same class and size, above which a fit has changed"""
@@ -266,7 +270,6 @@ RULES = (
     Rule("largest radius needs turns apart", f"{CLASSES}.hysteresis", "PlaySearch._turns_apart", _one),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),
-    Rule("missing play radius", f"{CLASSES}.findings", "radius_that_follows", _nothing),
     Rule("rows next to turns of a tool that leaves", f"{DATA}.strokes", "NEXT_TO_TURN", 0),
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
@@ -313,9 +316,9 @@ class Fit:
     options: dict[str, Any]
 
 
-def of_draw(draw: int) -> Fit:
-    """Returns a draw of the bench of ordinary recordings."""
-    _, rows = drawn(draw)
+def of_draw(draw: int, pairs: Sequence[Pair] | None = None) -> Fit:
+    """Returns a draw of the bench of ordinary recordings, or of some of its pairs of object and operator."""
+    _, rows = drawn(draw, pairs)
     return Fit([rows.recording()], Truth.of(rows).error, {})
 
 
@@ -411,6 +414,25 @@ def of_preload(draw: int) -> Fit:
     return Fit([recording], error, {})
 
 
+def of_changes(draw: int) -> Fit:
+    """Returns a spring with friction whose rows were stored at each change of the force."""
+    random = np.random.default_rng([42, draw])
+    time = np.linspace(0.0, 8.0, 80_001)
+    x = np.abs((time / 2.0 + 1.0) % 2.0 - 1.0)
+    force = 10.0 * x + (x - play(x, 0.005)) / 0.005
+    rows = np.flatnonzero(np.diff(np.floor(force / random.uniform(0.05, 0.2)), prepend=np.nan))
+    noise = random.normal(0.0, 0.01, len(rows))
+    recording = Recording.from_arrays(x[rows], force[rows] + noise, time[rows])
+    at = np.linspace(0.02, 0.98, 1000)
+
+    def error(model: Model) -> float:
+        found = np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
+        truth = np.concatenate([10.0 * at + 1.0, 10.0 * at - 1.0])
+        return float(normalised(root_mean_square(found - truth), truth))
+
+    return Fit([recording], error, {})
+
+
 def of_slots(draw: int, turns: int = 1) -> Fit:
     """Returns the torque of a motor with seven poles and twelve slots over some turns, identified with the
     period of one pole for one turn, else with the period that is found."""
@@ -498,12 +520,15 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
     number `seed` on, and a fifth of them with a gap; `files` is also the number of draws of each noise."""
     found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(seed, seed + draws)]
     found += [(f"draw {draw}", of_draw, draw) for draw in SHOWN[:draws]]
+    added = PAIRS[len(FIRST_PAIRS) :]
+    found += [(f"draw {draw}, added", of_draw, draw, added) for draw in SHOWN_ADDED[:draws]]
     found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
     for draw in range(files):
         found += [(f"{form.__name__}, draw {draw}", of_stored, form, draw) for form in STORED]
         found.append((f"poles and slots, draw {draw}", of_slots, draw))
         found.append((f"kinks without noise, draw {draw}", of_kinks, draw))
         found.append((f"preload, draw {draw}", of_preload, draw))
+        found.append((f"stored by change, draw {draw}", of_changes, draw))
         found.append((f"poles and slots over three turns, draw {draw}", of_slots, draw, 3))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:

@@ -15,7 +15,7 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..frames import pd
 from ..html_table import Curve, html_table
-from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text, reversal_findings
+from ..identification.classes.findings import USABLE_NRMSE, error_findings, error_text
 from ..identification.classes.memory import balanced
 from ..identification.data.rows import require_in_range
 from ..identification.data.strokes import weights_of_shared_errors
@@ -469,16 +469,6 @@ def _of_cause(
                 f"{STRUCTURED_CORRELATION:g}): the object is not the same, its zero position is not the "
                 f"same, or the force depends on an input that the model does not have, such as {missing}"
             )
-        )
-    side = found.prediction.side
-    if side is not None and (found.weight < 1.0).any():
-        position = recording.position[found.rows]
-        without = found.residual - model.force(position, direction=side)
-        findings += reversal_findings(
-            position,
-            lambda other: without + model.force(position, direction=other),
-            *errors_of([found]),
-            recording.file_unit("position"),
         )
     return [*findings, *noticed]
 

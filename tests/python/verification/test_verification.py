@@ -17,7 +17,6 @@ from palpate import (
     InputError,
     Model,
     Recording,
-    SearchOptions,
     identify,
     load_model,
     read_recording,
@@ -678,17 +677,6 @@ def test_a_wrong_play_radius_is_not_good() -> None:
     wrong = verify(model, friction(1, turning=0.02), play_radius=0.08)
     assert wrong.settled_nrmse == wrong.nrmse > 0.1
     assert wrong.verdict.level == "usable"
-
-
-def test_a_model_that_reverses_at_once_is_not_good_if_a_play_radius_follows_the_rows() -> None:
-    slow = friction(0, turning=0.05)
-    model = identify(slow, search=SearchOptions(play_radius=(0.003,)))
-    assert model.play_radius is None
-    for verdict in (model.verdict, verify(model, friction(1, turning=0.05)).verdict):
-        assert verdict.level == "usable"
-        assert "--search play_radius=0.05" in str(verdict)
-    better = identify(slow, search=SearchOptions(play_radius=(0.05,)))
-    assert str(better.verdict) == str(verify(better, friction(1, turning=0.05)).verdict) == "good"
 
 
 def test_wrong_readings_are_dropped_and_named() -> None:

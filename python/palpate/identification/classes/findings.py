@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +14,10 @@ from ...recording import Recording
 from ...recording.checks import findings_of
 from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
-from ...recording.units import Unit
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
-from ..data.strokes import radius_that_follows, weights_of_shared_errors
+from ..data.strokes import weights_of_shared_errors
 from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
@@ -59,29 +58,6 @@ def error_text(nrmse: float, settled: float, rows: str) -> str:
     if f"{settled:.2g}" != f"{nrmse:.2g}":
         text += f", {settled:.4g} if rows that wait or in which friction reverses share one error"
     return text
-
-
-def reversal_findings(
-    position: Float1D,
-    residual_of: Callable[[Float1D], Float1D],
-    whole: RowError,
-    judged: RowError,
-    unit: Unit,
-) -> list[Finding]:
-    """Returns a finding if the error that rows behind turns share is that of a missing play radius, and the
-    model is good without it. `position` (n,) and `residual_of` are those of `radius_that_follows`."""
-    if not judged.nrmse <= USABLE_NRMSE < whole.nrmse:
-        return []
-    if (radius := radius_that_follows(position, residual_of, judged.rmse)) is None:
-        return []
-    share = radius / float(np.ptp(position))
-    return [
-        usable(
-            f"the rows behind turns raise the NRMSE from {judged.nrmse:.3g} to {whole.nrmse:.3g}: the model "
-            f"reverses at once, and a play radius of {unit.text(radius)} follows them. Identify with "
-            f"--search play_radius={share:.2g}"
-        )
-    ]
 
 
 def verdict_of(
@@ -387,18 +363,6 @@ def _judged_error(best: Candidate, contact_share: float) -> RowError:
     return replace(error, weight=error.weight * weight)
 
 
-def _of_reversal(best: Candidate, judged: RowError) -> list[Finding]:
-    """Returns the finding on a missing play radius."""
-    rows, data = np.flatnonzero(best.error.weight > 0.0), best.data
-    if best.side is None or judged is best.error:
-        return []
-
-    def residual_of(side: Float1D) -> Float1D:
-        return np.asarray(best.static_force[rows] - best.network.force(data.domain[rows], side))
-
-    return reversal_findings(data.positions[rows, 0], residual_of, best.error, judged, data.position_unit)
-
-
 def identified(selection: ClassSelection) -> FittedNetwork:
     """Returns the accepted network in the units of the recording, with its error on the rows, all notes and
     findings."""
@@ -415,7 +379,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     (below, first), (above, last) = (_outside(best, options, into) for into in (1.0, -1.0))
     box = data.box[:, 0]
     left = ((box < first) & (below == "free")) | ((box > 1.0 - last) & (above == "free"))
-    findings += wait_findings(best, left) + _of_reversal(best, settled)
+    findings += wait_findings(best, left)
     judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
     shift = effect_of_shift(selection)

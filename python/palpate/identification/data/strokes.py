@@ -4,13 +4,11 @@ force."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ... import _core
@@ -374,29 +372,3 @@ class HysteresisInput:
             known.append(covered >= 2.0 * radius)
         all_known = np.concatenate(known)
         return cls(np.concatenate(side), all_known if all_known.any() else ~all_known, radius)
-
-
-FOLLOWED_RATIO = 1.2
-"""Largest ratio of the RMS error with a play radius to that without the error which rows behind turns share,
-up to which this play radius follows them as well as the other rows [-]"""
-
-
-def radius_that_follows(
-    position: Float1D, residual_of: Callable[[Float1D], Float1D], settled: float
-) -> float | None:
-    """Returns the play radius [position] that follows the reversal behind turns, so that rows of strokes have
-    nearly the RMS error `settled` [force] that they have without the error which rows behind turns share;
-    None if friction reverses in another way.
-
-    `position` (n,) is in recorded order, and `residual_of` returns the residual (n,) for direction states.
-    """
-    travel = float(np.ptp(position)) or 1.0
-
-    def error(log_radius: float) -> float:
-        play = HysteresisInput.of_play([position], math.exp(log_radius) * travel)
-        return float(np.sqrt(np.mean(residual_of(play.side)[play.known] ** 2)))
-
-    # Friction reverses within twice the play radius.
-    bounds = math.log(0.5 * NEAR_TURN[0]), math.log(0.5 * NEAR_TURN[-1])
-    found = scipy.optimize.minimize_scalar(error, bounds=bounds, method="bounded")
-    return math.exp(found.x) * travel if found.fun <= FOLLOWED_RATIO * settled else None
