@@ -450,14 +450,14 @@ class Plan:
         The k strokes are press and release for a model with hysteresis. The force limit of the device limits
         the felt force.
         """
-        x, identified, rendered = self._unlimited_at_rest()
+        x, identified, rendered = self._unlimited_at_rest
         limit = self._force_limit
         return x, identified, np.clip(rendered, -limit, limit)
 
-    @cached_property
+    @property
     def largest_at_rest(self) -> float:
         """Largest absolute force that a handle at rest would feel without the force limit of the device."""
-        return float(np.abs(self._unlimited_at_rest()[2]).max())
+        return float(np.abs(self._unlimited_at_rest[2]).max())
 
     @property
     def _force_limit(self) -> float:
@@ -466,7 +466,9 @@ class Plan:
         device = None if self.certificate is None else self.certificate.device
         return math.inf if device is None or device.admittance is not None else device.force_limit
 
+    @cached_property
     def _unlimited_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
+        """The values of `forces_at_rest`, without the force limit of the device"""
         x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
         if self.model.of_velocity:  # this model is always rendered without a coupling
             force = self.model.predict(np.column_stack([x, np.zeros_like(x)]))[None, :]
