@@ -105,7 +105,7 @@ _METAVAR = {
 }
 """Placeholder that the help shows for the value of an option, by option."""
 
-_MOST_DECISIONS = 7
+_MOST_DECISIONS = 6
 """Largest number of decisions of the model selection that the summary prints"""
 
 _GROUP = {"inputs": "Model", "period": "Model", "monotone": "Constraints"}

@@ -235,6 +235,27 @@ def test_the_slope_behind_a_turn_is_judged_apart() -> None:
     assert model.slope_ratio(line(1.0), settled=True) == pytest.approx(1.0)
 
 
+def test_the_friction_of_a_model_reverses_over_its_play_radius() -> None:
+    """A radius wider than that of the object is an error behind a turn, and its slope there is left out."""
+    friction, truth = 0.1 * SCALE, Truth.of(spring())
+    rubbing = replace(truth, force=truth.force + friction * truth.side)
+    errors = []
+    for radius in (1e-9, 0.1):
+        model = line(
+            SCALE / TRAVEL,
+            weight_hysteresis=[],
+            linear_hysteresis=[0.0],
+            bias_hysteresis=friction,
+            play_radius=radius * TRAVEL,
+        )
+        errors.append(rubbing.error(model))
+        assert rubbing.slope_ratio(model) > 1.9
+        assert rubbing.slope_ratio(model, settled=True) < 1.5
+    # over a share 2 r of each stroke the state is wrong by 2 to 0 of the friction
+    expected = friction * np.sqrt(2.0 * 0.1 * 4.0 / 3.0) / np.std(rubbing.force)
+    assert errors == pytest.approx([0.0, expected], rel=0.03, abs=1e-3)
+
+
 def test_only_an_error_over_a_hundredth_of_the_stroke_is_a_wrong_place() -> None:
     truth = Truth.of(spring())
     for share, wrong in ((0.005, False), (0.02, True)):
@@ -262,7 +283,7 @@ def test_a_refused_recording_is_counted_and_not_judged(capsys: pytest.CaptureFix
     refused, not_fitted = (
         {"verdict": verdict, "object": "spring"} for verdict in ("refused", "no reference")
     )
-    rows = [{**wrong, "object": "spring", "seconds": 0.1}, refused, not_fitted]
+    rows = [{**wrong, "object": "spring", "operator": "tester", "seconds": 0.1}, refused, not_fitted]
     shares = {each["name"]: each for each in report(rows)}
     assert shares["good, but wrong"]["share"] == 1.0
     assert shares["good, but wrong"]["met"] is False

@@ -124,9 +124,12 @@ class Cause:
     """Property of the strokes that explains most of what differs between strokes over the same place."""
 
     sentence: str
-    of_speed: bool
+    by: str
+    """Sentence on the property: FASTER, TURNED, FIRST or LATER"""
     share: float
     """Share of the squared difference that it explains [-]"""
+    explained: float
+    """Mean square of the force that it explains [force^2]"""
     noticed: float
     """Change of the force by it, without its random part, in just noticeable differences"""
 
@@ -287,7 +290,8 @@ def cause_of(best: Judged) -> Cause | None:
         speed = "" if data.parts else ", the speed"
         text = sentence.format(way_of_change, amount, pinched=best.pinched, speed=speed)
         criterion = deviance("bic", max(rss, TINY * before), n, table.shape[1])
-        found.append((criterion, Cause(text, sentence == FASTER, 1.0 - rss / before, noticed)))
+        explained = (before - rss) / float(np.sum(strokes.share))
+        found.append((criterion, Cause(text, sentence, 1.0 - rss / before, explained, noticed)))
     found = [each for each in found if each[1].perceptible] or found
     least = min(criterion for criterion, _ in found)
     if least >= deviance("bic", before, n, 0):

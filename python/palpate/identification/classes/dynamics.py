@@ -28,7 +28,7 @@ from ...recording.motion import (
     strokes_from_order,
     turns_of,
 )
-from ...verdict import FORCE_FLOOR
+from ...verdict import FORCE_FLOOR, Finding, force_jnd, usable
 from ..data.limits import evenly_spread
 from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
@@ -192,9 +192,10 @@ class Dynamics:
 
     def accepted(
         self, basis: Basis, strokes: HysteresisInput | None
-    ) -> tuple[dict[str, float], list[Decision]]:
-        """Returns accepted values of damping and mass for given wavelets of the force, and the decisions on
-        both.
+    ) -> tuple[dict[str, float], list[Decision], list[Finding]]:
+        """Returns accepted values of damping and mass for given wavelets of the force, the decisions on both,
+        and a finding on a value below zero that a hand would notice: no passive object has it, but a late
+        force F(t - t0) = F - t0 dF/dt shows one.
 
         Parameters
         ----------
@@ -205,8 +206,9 @@ class Dynamics:
         """
         regression = self._regression(basis, strokes)
         if regression is None:
-            return {}, [Decision("damping", "not tested", SHORT_MOTION), self._mass_not_tested()]
+            return {}, [Decision("damping", "not tested", SHORT_MOTION), self._mass_not_tested()], []
         decisions: list[Decision] = []
+        findings: list[Finding] = []
         allowed = self._terms
         spread = spread_of_speeds(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
         if spread < LEAST_SPEED_SPREAD:
@@ -235,7 +237,8 @@ class Dynamics:
                 bound = f"must lower it by at least {self._evidence:.4g}"
                 decisions.append(decided(name, False, f"{change}, {bound}"))
                 continue
-            share, error = regression.held_out_gain(use, without, with_it)
+            known = float(np.mean(self._derivatives[TERMS.index(name)][1]))  # other rows keep their error
+            share, error = (known * each for each in regression.held_out_gain(use, without, with_it))
             found = regression.solved(use, with_it)[name]
             measured = squared_error_change(share, error, "held-out sections")
             if share - error >= LEAST_GAIN and found > 0.0:
@@ -245,9 +248,20 @@ class Dynamics:
             reason = f"{measured}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
             if not found > 0.0:
                 value = found / self._data.force_unit.scale
-                reason = f"the fitted {name} is {value:.4g} {self._unit_of(name)}, a passive object has > 0"
+                number = f"{value:.4g} {self._unit_of(name)}".rstrip()
+                reason = f"the fitted {name} is {number}, a passive object has > 0"
+                if share - error >= LEAST_GAIN and self._noticed(name, found):
+                    cause = "a force that is recorded late shows this; give --force-late-s SECONDS, its delay"
+                    findings.append(usable(f"{reason}, and a hand notices its force: {cause}"))
             decisions.append(decided(name, False, f"{reason}; {change}"))
-        return regression.solved(use, names), decisions
+        return regression.solved(use, names), decisions, findings
+
+    def _noticed(self, name: str, value: float) -> bool:
+        """True if the force of a damping or a mass is above a just noticeable difference on average."""
+        derived, known = self._derivatives[TERMS.index(name)]
+        force = self._data.force
+        jnd = force_jnd(force[known], FORCE_FLOOR * float(np.abs(force).max()))
+        return bool(np.mean(np.abs(value * derived[known]) / jnd) > 1.0)
 
     def _mass_not_tested(self) -> Decision:
         """Returns the decision that mass is not tested, with the mass whose force a hand would feel if each

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.checks import findings_of
-from ...recording.motion import noise_band, strokes_from_order
+from ...recording.motion import noise_band, strokes_from_order, turns_of
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
 from ..data.strokes import weights_of_shared_errors
-from ..log import Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
+from ..log import Decision, Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
@@ -154,12 +154,11 @@ def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
     return Judged(best.data, best.residual, best.settled.weight, best.side, inputs, height, passive)
 
 
-def findings_over_time(network: FittedNetwork, rows: Rows) -> list[Finding]:
-    """Returns the findings on strokes and places of a model with memory, which has a residual on all rows."""
+def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
+    """Returns an identified network that has a residual on all rows."""
     assert network.residual is not None
     side = rows.order if rows.side is None else rows.side
-    judged = Judged(rows, network.residual, rows.fitted.astype(float), side, _inputs(network))
-    return drift_findings(judged) or place_findings(judged)
+    return Judged(rows, network.residual, rows.fitted.astype(float), side, _inputs(network))
 
 
 def place_findings(best: Judged) -> list[Finding]:
@@ -293,7 +292,7 @@ def _outside(best: Candidate, options: IdentifyOptions, into: float) -> tuple[st
         choice = "linear"
     if choice != "auto":
         return choice, 0.0
-    near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
+    near_zero = options.search.contact_share * float(np.ptp(best.static_force[data.reported]))
     held = len(data.names) > 1 or data.period is not None
     if held or _pulls(best, max(best.rmse, near_zero), into):
         return "linear", 0.0
@@ -351,6 +350,25 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     ]
 
 
+def hidden_by_friction(best: Candidate, decisions: Sequence[Decision]) -> list[Decision]:
+    """Returns the decision that the faults are not tested which the rows do not distinguish from friction;
+    none without friction. `decisions` holds the other ones."""
+    data = best.data
+    if best.strokes is None or len(data.names) > 1:
+        return []
+    direction = strokes_from_order(data.path[:, 0])
+    one_speed = not data.parts or any(
+        each.model_class == "damping" and each.outcome == "not tested" for each in decisions
+    )
+    cures = {"backlash": "mount the object without backlash"}
+    if direction is None or turns_of(direction) < 2:
+        cures["moved zero"] = "press a second time"
+    if one_speed:
+        cures["late force"] = "record the time, slow and fast strokes"
+    cure = f"the loop of friction hides it; {', '.join(cures.values())}"
+    return [Decision(", ".join(cures), "not tested", cure)]
+
+
 def _judged_error(best: Candidate, contact_share: float) -> RowError:
     """Returns the error that the verdict uses, as a verification computes it: rows behind turns share an
     error that is left there. A play radius states how friction reverses, so that these rows count whole."""
@@ -383,6 +401,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
     shift = effect_of_shift(selection)
+    decisions += hidden_by_friction(best, decisions) if shift is None else []
     findings += (
         ([usable(shift.sentence)] if shift and shift.perceptible else [])
         or log.findings

@@ -27,9 +27,11 @@ from ...verdict import Finding, usable
 from ..data.rows import rows_of
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
+from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
-from .findings import USABLE_NRMSE, findings_over_time
+from .causes import FIRST, LATER, cause_of
+from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
 from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
@@ -366,11 +368,12 @@ def better_with_memory(
     if choice.shape is None:
         return _refused(found, "no branch lowers the criterion")
     compared = _Compared.of(found, recorded)
-    before = (compared.rmse / recorded.spread) ** 2
+    moved = _moved_zero(found, recordings, options)
+    before = max(compared.rmse**2 - moved, TINY) / recorded.spread**2
     in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
-        return _refused(found, _gain_text(in_sample, 0.0))
+        return _refused(found, _gain_text(in_sample, 0.0, moved))
     at_rest = replace(recorded.at_rest(choice, identify_rest), below=recorded.below, above=recorded.above)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
@@ -406,7 +409,8 @@ def better_with_memory(
     of_all = _rms(of_rows, recorded.weight)
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
-        error, before = max(where_sure, of_all), (compared.rmse_where_sure / recorded.spread) ** 2
+        error = max(where_sure, of_all)
+        before = max(compared.rmse_where_sure**2 - moved, TINY) / recorded.spread**2
     # A network of velocity, which is as hard to render, is not preferred to a memory that is good in motion.
     allowed = USABLE_NRMSE * recorded.spread if over_velocity else 0.0
     if where_sure**2 > max((1.0 + LEAST_GAIN) * compared.rmse_where_sure**2, allowed**2):
@@ -421,7 +425,7 @@ def better_with_memory(
     gain = 1.0 - max(error / recorded.spread, left_out_nrmse) ** 2 / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
     n_parameters = network.n_parameters + refined.n_parameters
-    text = _gain_text(gain, scatter)
+    text = _gain_text(gain, scatter, moved)
     accepted = gain - scatter >= LEAST_GAIN
     if over_velocity:
         # Both are as hard to render. At one speed both fit the same recording, a branch with fewer numbers.
@@ -456,10 +460,20 @@ def better_with_memory(
             list(_undetermined(found, recordings)),
         ),
     )
-    findings = findings_over_time(network, rows_of(recordings, options))
+    judged = judged_network(network, rows_of(recordings, options))
+    findings = drift_findings(judged) or place_findings(judged)
     if recorded.left and 2.0 * error**2 <= of_all**2 and (findings or nrmse > USABLE_NRMSE):
         findings = [_forgotten(recorded, of_all, error)]
     return replace(network, log=network.log + Log(findings=findings))
+
+
+def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> float:
+    """Returns the mean square of the force [force^2] that a zero or an object that changes explains of the
+    residual without memory, as branches can: a memory must explain more. 0 if nothing changes."""
+    if found.residual is None or len(found.residual) != sum(map(len, recordings)):
+        return 0.0
+    cause = cause_of(judged_network(found, rows_of(recordings, options)))
+    return cause.explained if cause is not None and cause.by in (FIRST, LATER) else 0.0
 
 
 def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
@@ -506,9 +520,10 @@ def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
     return replace(found, log=found.log + Log(decisions=[decided("memory", False, reason)]))
 
 
-def _gain_text(gain: float, error: float) -> str:
+def _gain_text(gain: float, error: float, moved: float) -> str:
     change = squared_error_change(gain, error, "held-out sections")
-    return f"{change}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
+    compared = " compared with a zero or an object that changes" if moved else ""
+    return f"{change}{compared}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
 
 
 IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]

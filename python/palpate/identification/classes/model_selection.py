@@ -20,7 +20,7 @@ from ..data.rows import Rows
 from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
-from .causes import cause_of
+from .causes import FASTER, cause_of
 from .class_selection import (
     REGROWTH_ERROR_RATIO,
     VELOCITY_INPUTS,
@@ -104,7 +104,7 @@ class MassAndDamping(ModelClass):
         assert motion is not None
         found, log, change = below, Log(), math.inf
         while True:
-            values, decisions = motion.accepted(found.solution.basis, found.strokes)
+            values, decisions, findings = motion.accepted(found.solution.basis, found.strokes)
             moving = motion.moving(values)
             if not values or min(values.values()) <= 0.0 or not moving.known.any():
                 found = below  # a passive object has no negative mass or damping
@@ -125,10 +125,11 @@ class MassAndDamping(ModelClass):
                 moving=moving,
             )
         selection.log.decisions.extend(decisions)
+        selection.log.findings.extend(findings if not selection.log.findings else [])
         if found is below:
             return below
         note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
-        selection.log.follow(log, [note])
+        selection.log.follow(replace(log, findings=findings or log.findings), [note])
         return selection.recorded(found)
 
 
@@ -155,7 +156,7 @@ class Velocity(ModelClass):
         damped = moving is not None and moving.mass is None
         residual = below.static_force - below.force_at()
         cause = cause_of(judged_candidate(below))
-        if cause is None or not (cause.of_speed and cause.perceptible and cause.share >= LEAST_GAIN):
+        if cause is None or not (cause.by == FASTER and cause.perceptible and cause.share >= LEAST_GAIN):
             if not (damped or below.settled.nrmse > USABLE_NRMSE):
                 return below
             if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:
@@ -176,17 +177,19 @@ class Velocity(ModelClass):
             force_unit=data.force_unit,
         )
         both = select(over_both, self._selection.options)
-        weight = below.fit_weight[rows]
-        before, after = (float(weight @ each**2) for each in (residual[rows], both.best.residual))
+        squares = below.fit_weight * residual**2
+        before, unknown = float(np.sum(squares)), float(np.sum(squares[~rows]))  # the latter have no velocity
+        after = float(below.fit_weight[rows] @ both.best.residual**2)
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
         if shift := shift_of(self._selection, below):
             # A network that is grown without the shift explains as much as the velocity of a late force.
             moved = shift.without
             grown = self._selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
-            before *= (grown.problem.rmse(grown.solution) / shift.before) ** 2
+            unshifted = (grown.problem.rmse(grown.solution) / shift.before) ** 2
+            before, unknown = before * unshifted, unknown * unshifted
             compared = f"{compared} with shifted strokes"
-        share = 1.0 - after / before if before > 0.0 else 0.0
+        share = 1.0 - (after + unknown) / before if before > 0.0 else 0.0
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
         bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
         decision = decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}")

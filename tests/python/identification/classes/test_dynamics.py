@@ -2,6 +2,7 @@
 """Velocity, mass, damping and hysteresis are identified only if they are present."""
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -168,6 +169,20 @@ def test_friction_without_passive_hysteresis_makes_velocity_an_input() -> None:
 
 
 @pytest.mark.full
+def test_rows_without_a_velocity_keep_their_error() -> None:
+    """Between gaps of time only the first rows have a velocity: a network over it ignores the others."""
+    whole = jointed(0, 0.3)
+    row = np.arange(len(whole))
+    assert whole.time is not None
+    gaps = np.cumsum((row >= 0.3 * len(row)) & (row % 10 == 0))
+    model = identify(Recording.from_arrays(whole.position, whole.force, whole.time + gaps))
+    (decision,) = (each for each in model.notes["model_selection"] if "position and velocity: " in each)
+    share = re.search(r"lowers the squared error by ([\d.]+) %", decision)
+    assert share is not None
+    assert float(share[1]) <= 30.0
+
+
+@pytest.mark.full
 def test_friction_explained_by_hysteresis_is_hysteresis() -> None:
     model = identify(jointed(1, 0.3, viscous=0.0))
     assert model.kind == "hysteresis"
@@ -259,8 +274,27 @@ def test_a_negative_damping_is_refused() -> None:
     assert decision.startswith("damping: not accepted (the fitted damping is -0.0")
 
 
+def test_a_negative_damping_that_a_hand_notices_is_named() -> None:
+    """A force that is late by t0 shows the damping -k t0 of a stiffness k."""
+    verdict = str(identify(to_and_fro(0, [0.15, 0.15, 0.45, 0.45], damping=-0.1)).verdict)
+    assert "the fitted damping is -0.1, a passive object has > 0, and a hand notices its force" in verdict
+    verdict = str(identify(to_and_fro(0, [0.15, 0.15, 0.45, 0.45], damping=-0.01)).verdict)
+    assert "the fitted damping" not in verdict
+
+
+def test_a_static_force_below_that_of_a_damping_is_kept_in_the_whole_domain() -> None:
+    """What counts as no force is a share of the static force: the damping has 25 times its range."""
+    time = np.arange(3000) * 1e-3
+    x = 0.02 * (1.0 - np.cos(2.0 * np.pi * np.cumsum(0.4 + 0.3 * time) * 1e-3))
+    force = 40.0 * np.gradient(x, time) + 4.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))
+    model = identify(Recording.from_arrays(x, force, time))
+    assert model.damping == pytest.approx(40.0, rel=0.01)
+    assert model.above == "linear"
+    assert model.force(0.04) == pytest.approx(0.16, rel=0.05)
+
+
 def test_a_damping_that_the_last_fit_makes_negative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Dynamics, "accepted", lambda *_: ({"damping": -0.01}, []))
+    monkeypatch.setattr(Dynamics, "accepted", lambda *_: ({"damping": -0.01}, [], []))
     model = identify(moved(1))
     assert (model.fit.model_class, model.damping) == ("position", None)
 

@@ -166,6 +166,16 @@ def test_a_zero_that_cannot_be_felt_to_move_gives_no_finding(count: int, drift: 
     assert "the zero of the force or the object changed" not in verdict
 
 
+@pytest.mark.parametrize(("count", "hidden"), [(1, True), (2, False)])
+def test_what_friction_can_hide_is_stated_not_to_be_tested(count: int, hidden: bool) -> None:
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)], count)
+    force = 2.0 * x + 0.1 * np.repeat([1.0, -1.0] * count, 60)
+    model = palpate.identify(palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x))))
+    (decision,) = (each for each in model.notes["model_selection"] if "friction hides it" in each)
+    names = ["backlash", *(["moved zero"] if hidden else []), "late force"]
+    assert decision.startswith(f"{', '.join(names)}: not tested")
+
+
 def conditioned(count: int, loss: float) -> palpate.Recording:
     """Returns presses and releases of an elastomer whose first press is harder than the others (Mullins)."""
     x = np.tile(np.r_[np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)], count)

@@ -443,6 +443,17 @@ def test_strokes_that_differ_are_found_in_the_residual_of_the_memory() -> None:
     assert "from the first row to the last" in model.verdict.reasons[0]
 
 
+def test_a_zero_that_drifts_is_no_branch_that_slips() -> None:
+    """Branches that start at rest make the first stroke differ from the others too."""
+    x = np.tile(np.r_[np.linspace(-0.5, 0.5, 200), np.linspace(0.5, -0.5, 200)], 2)
+    force = 2.0 * x + 0.05 * np.clip((x - play(x, 0.005, start=x[0])) / 0.005, -1.0, 1.0)
+    force -= 0.1 * np.linspace(0.0, 1.0, len(x))
+    model = palpate.identify(x, force + np.random.default_rng(0).normal(0.0, 0.004, len(x)))
+    assert model.memory is None
+    assert "from the first row to the last" in model.verdict.reasons[0]
+    assert "compared with a zero or an object that changes" in str(model.notes["model_selection"])
+
+
 def test_a_large_rise_of_the_error_is_stated_as_a_multiple() -> None:
     text = squared_error_change(-569.79, 0.0, "held-out sections")
     assert text == "raises the squared error on held-out sections to 571 times"
