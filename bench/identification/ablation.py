@@ -56,7 +56,10 @@ FILES = 4
 LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
-SHOWN = (10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 10952, 11611)
+SHOWN = (
+    *(10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 10952, 11611),
+    *(13951, 14318),
+)
 """Draws that show a rule which other draws seldom show"""
 
 SHOWN_ADDED = (10924, 10925, 10938, 10953, 10985)
@@ -277,6 +280,7 @@ RULES = (
     Rule("velocity needs a part of the residual", f"{CLASSES}.dynamics", "Dynamics.share_of_velocity", _one),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
     Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
+    Rule("memory explains more than a zero that moves", f"{CLASSES}.memory", "_moved_zero", lambda *_: 0.0),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_residual", lambda of: of.best.residual),
     *map(without_check, checks.CHECKS),
@@ -286,6 +290,7 @@ RULES = (
         "LONGEST_LAG_S 0.1, not 0.005", f"{CLASSES}.shift", "LAGS_S", 0.005 * 2.0 ** np.arange(-7.0, 0.5, 0.5)
     ),
     Rule("velocity is compared with a shift", f"{CLASSES}.model_selection", "shift_of", _nothing),
+    Rule("check: damping below zero", f"{CLASSES}.dynamics", "Dynamics._noticed", lambda *_: False),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
     Rule("check of drift", f"{CLASSES}.findings", "drift_findings", _no_findings),
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),

@@ -194,8 +194,9 @@ class Dynamics:
         self, basis: Basis, strokes: HysteresisInput | None
     ) -> tuple[dict[str, float], list[Decision], list[Finding]]:
         """Returns accepted values of damping and mass for given wavelets of the force, the decisions on both,
-        and a finding on a value below zero that a hand would notice: no passive object has it, but a late
-        force F(t - t0) = F - t0 dF/dt shows one.
+        and a finding on a value below zero that a hand notices.
+
+        No passive object has such a value, but a late force F(t - t0) = F - t0 dF/dt shows one.
 
         Parameters
         ----------

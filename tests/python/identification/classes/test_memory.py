@@ -443,7 +443,7 @@ def test_strokes_that_differ_are_found_in_the_residual_of_the_memory() -> None:
     assert "from the first row to the last" in model.verdict.reasons[0]
 
 
-def test_a_zero_that_drifts_is_no_branch_that_slips() -> None:
+def test_a_zero_that_drifts_is_not_a_branch_that_slips() -> None:
     """Branches that start at rest make the first stroke differ from the others too."""
     x = np.tile(np.r_[np.linspace(-0.5, 0.5, 200), np.linspace(0.5, -0.5, 200)], 2)
     force = 2.0 * x + 0.05 * np.clip((x - play(x, 0.005, start=x[0])) / 0.005, -1.0, 1.0)
