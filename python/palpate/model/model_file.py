@@ -21,7 +21,7 @@ from .._core.stability import Certificate
 from .._typing import Float1D
 from ..errors import InputError, escaped
 from ..recording.files import replacing
-from ..recording.units import Unit
+from ..recording.units import Unit, unit_of_dynamics
 from .band import BAND_LEVEL, Band
 
 _MULTILINE_FIELDS = ("network", "memory", "fit", "band", "plan", "certificate")
@@ -181,11 +181,13 @@ def describe(model: Model) -> str:
 def dynamics_of(model: Model) -> dict[str, str]:
     """Returns mass and damping of a model with their units for display, by name, without those that are
     zero or that it does not have."""
-    position, force = model.units["position"], model.units["force"]
-    known = bool(position and force)
-    mass = {"m N": "kg", "rad N*m": "kg*m^2"}.get(f"{position} {force}", f"{force}*s^2/{position}")
-    values = (("mass", model.mass, mass), ("damping", model.damping, f"{force}*s/{position}"))
-    return {name: f"{value:.4g} {unit if known else ''}".rstrip() for name, value, unit in values if value}
+    units = model.units["force"], model.units["position"]
+    values = {"mass": model.mass, "damping": model.damping}
+    return {
+        name: f"{value:.4g} {unit_of_dynamics(name, *units)}".rstrip()
+        for name, value in values.items()
+        if value
+    }
 
 
 def fitted_rows(model: Model) -> str:

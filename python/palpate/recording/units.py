@@ -50,6 +50,20 @@ class Unit:
 UNSTATED_UNIT = Unit.of_si("")
 """Unit of a quantity in SI units whose source does not state the unit."""
 
+_MASS_UNITS = {("N", "m"): "kg", ("N*m", "rad"): "kg*m^2"}
+"""Units of a mass that have a name, by the units of force and position."""
+
+
+def unit_of_dynamics(name: str, force: str, position: str) -> str:
+    """Returns the SI unit of a "mass" or a "damping" for SI units of force and position; empty if one of
+    these is not stated."""
+    if not (force and position):
+        return ""
+    if name == "damping":
+        return f"{force}*s/{position}"
+    return _MASS_UNITS.get((force, position), f"{force}*s^2/{position}")
+
+
 CLOCK = Unit("date or clock time", "s", 1.0)
 """Unit of a column of dates or clock times, which are read as seconds since the first row."""
 

@@ -28,6 +28,7 @@ from ...recording.motion import (
     strokes_from_order,
     turns_of,
 )
+from ...recording.units import unit_of_dynamics
 from ...verdict import FORCE_FLOOR, Finding, force_jnd, usable
 from ..data.limits import evenly_spread
 from ..data.rows import Rows, modulo
@@ -282,11 +283,7 @@ class Dynamics:
         return Decision("mass", "not tested", f"{SHORT_MOTION}; {limit}")
 
     def _unit_of(self, name: str) -> str:
-        """Returns the unit of damping or mass; empty if the units of force and position are not known."""
-        force, position = self._data.force_unit.si, self._data.position_unit.si
-        if not (force and position):
-            return ""
-        return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
+        return unit_of_dynamics(name, self._data.force_unit.si, self._data.position_unit.si)
 
     def moving(self, values: dict[str, float]) -> Moving:
         """Returns given mass m and damping B with their force m a + B v at every row. Acceleration a and

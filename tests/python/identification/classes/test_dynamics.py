@@ -14,7 +14,10 @@ from conftest import sampled
 from imperfect import Array
 from palpate import Model, Recording, identify, read_recording, verify
 from palpate._core.model import play
+from palpate.identification import IdentifyOptions
 from palpate.identification.classes.dynamics import Dynamics
+from palpate.identification.data.rows import rows_of
+from palpate.identification.network.basis import Basis
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
@@ -338,6 +341,15 @@ def test_presses_at_constant_speeds_show_damping_without_an_acceleration() -> No
     assert model.damping == pytest.approx(0.2, rel=0.01)
     assert (model.mass, model.verdict.level) == (None, "good")
     assert any(line.startswith("mass: not tested") for line in model.notes["model_selection"])
+
+
+def test_a_mass_that_is_not_tested_is_stated_in_kg() -> None:
+    position = np.repeat(0.01 * np.abs(np.linspace(-1.0, 1.0, 100)), 2)
+    units = {"position": "m", "force": "N"}
+    recording = Recording.from_arrays(position, 500.0 * position, time=np.arange(200.0), units=units)
+    options = IdentifyOptions()
+    _, decisions, _ = Dynamics(rows_of([recording], options), options).accepted(Basis.empty(1), None)
+    assert " kg changes the force" in str(decisions[-1])
 
 
 def test_constant_speeds_do_not_show_the_force_between_them() -> None:
