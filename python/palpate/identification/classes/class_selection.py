@@ -9,10 +9,10 @@ constraints imposed. It is accepted only if the criterion decreases by at least 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -36,8 +36,7 @@ from ..search.evidence import Candidate, Judge, Samples, criterion_of
 from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
 
-if TYPE_CHECKING:
-    from .shift import Shift
+Value = TypeVar("Value")
 
 REGROWTH_ERROR_RATIO = 1.01
 """Ratio of the RMS error with constraints to the RMS error without constraints, above which a network is
@@ -79,8 +78,7 @@ class ClassSelection:
         self.judge = Judge(self.samples, options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
-        self.shifted: tuple[Candidate, Shift | None] | None = None
-        """The last candidate that was tested for a shift of its strokes, and the shift"""
+        self._once: dict[Callable[..., Any], tuple[Candidate, Any]] = {}
         self._fixed_force = self._fixed_in_box()
         self.spread = float(np.std(data.force[data.reported])) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
@@ -95,6 +93,13 @@ class ClassSelection:
         for model_class in classes:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
+
+    def once(self, compute: Callable[[ClassSelection], Value]) -> Value:
+        """Returns the value of a function of this selection, computed once for each best candidate."""
+        if compute not in self._once or self._once[compute][0] is not self.best:
+            self._once[compute] = self.best, compute(self)
+        value: Value = self._once[compute][1]
+        return value
 
     def repeated(self, data: Rows) -> ClassSelection:
         """Repeats this model selection on changed rows."""

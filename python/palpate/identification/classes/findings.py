@@ -208,7 +208,7 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     without such a shift, or if it changes less than the error on the rows. The change is that at the places
     and directions of the rows."""
     best = selection.best
-    if (shift := shift_of(selection, best)) is None:
+    if (shift := shift_of(selection)) is None:
         return None
     data, unit, weight = best.data, best.data.force_unit, best.settled.weight
     box, side = data.box, np.zeros(len(weight)) if best.strokes is None else best.strokes.side
@@ -410,7 +410,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or drift_findings(judged)
         or place_findings(judged)
     )
-    share, left_out = np.where(data.fitted, best.share, 1.0), left_out_residual(selection)
+    share, left_out = np.where(data.fitted, best.share, 1.0), selection.once(left_out_residual)
     if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":
         notes.append(
             "Rows behind turns share an error, because friction reverses there, and count less in the fit: "

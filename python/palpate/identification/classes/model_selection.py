@@ -182,7 +182,7 @@ class Velocity(ModelClass):
         after = float(below.fit_weight[rows] @ both.best.residual**2)
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
-        if shift := shift_of(self._selection, below):
+        if shift := shift_of(self._selection):
             # A network that is grown without the shift explains as much as the velocity of a late force.
             moved = shift.without
             grown = self._selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)

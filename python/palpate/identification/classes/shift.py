@@ -46,7 +46,7 @@ class Shift:
     """Model of the rows without the shift"""
 
 
-def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
+def shift_of(selection: ClassSelection) -> Shift | None:
     """Returns the shift of press against release that explains most of a release above the press; None
     without such a release, or if no shift explains it.
 
@@ -57,13 +57,12 @@ def shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     to it, the wavelets of the model are refined on moved rows. The shift must explain a quarter of the
     squared error that is not noise, as velocity must.
     """
-    if selection.shifted is None or selection.shifted[0] is not best:
-        selection.shifted = best, _shift_of(selection, best)
-    return selection.shifted[1]
+    return selection.once(_shift_of)
 
 
-def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
-    data, options = best.data, selection.options
+def _shift_of(selection: ClassSelection) -> Shift | None:
+    best, options = selection.best, selection.options
+    data = best.data
     side = data.order if data.side is None else data.side
     if side is None or len(data.names) > 1 or best.moving is not None:
         return None  # a late force also looks like a mass and a damping, which are subtracted here
@@ -98,7 +97,7 @@ def _shift_of(selection: ClassSelection, best: Candidate) -> Shift | None:
     if criterion_of(problem, free, "bic") + options.search.evidence > constrained:
         return None
     explained = unmoved.rmse**2 - problem.rmse(free) ** 2
-    between = replace(best.error, residual=left_out_residual(selection))
+    between = replace(best.error, residual=selection.once(left_out_residual))
     if explained < between.rmse**2 - best.error.rmse**2:
         return None  # rows that are far apart explain as much
     amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]

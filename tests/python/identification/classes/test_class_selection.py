@@ -10,6 +10,9 @@ import palpate
 from palpate import InputError
 from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
+from palpate.identification.classes.class_selection import ClassSelection, constant
+from palpate.identification.classes.model_selection import select
+from palpate.identification.data.rows import Rows
 from palpate.identification.network.fitted import FittedNetwork
 
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
@@ -375,3 +378,18 @@ def test_wavelet_limit_is_not_reported_if_the_error_is_noise() -> None:
     network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=1))
     assert network.stop_reason == "max_wavelets"
     assert not any("--max-wavelets" in finding.sentence for finding in network.log.findings)
+
+
+def test_a_value_of_the_best_candidate_is_computed_once() -> None:
+    x = np.linspace(0.0, 1.0, 20)
+    selection = select(Rows(("position",), x[:, None], x), IdentifyOptions(max_wavelets=0))
+    computed: list[str] = []
+
+    def name(of: ClassSelection) -> str:
+        computed.append(of.best.model_class)
+        return computed[-1]
+
+    assert selection.once(name) == selection.once(name) == "linear"
+    selection.best = constant(selection)
+    assert selection.once(name) == "constant"
+    assert computed == ["linear", "constant"]
