@@ -15,7 +15,6 @@ from .._typing import Float1D, Float2D
 from ..arguments import number_of, shown
 from ..errors import InputError
 from ..identification import IdentifyOptions
-from ..identification.classes.model_selection import POSITION_FACTORS
 from ..identification.data.compression import Compressor
 from ..identification.network.basis import Basis
 from ..identification.network.separable import (
@@ -90,7 +89,7 @@ class PaperNetwork:
             column = int(np.argmin(self.reach_))
             raise InputError(f"column {column} of X is {X[0, column]:g} in every row: it must vary")
         options, d = IdentifyOptions(), X.shape[1]
-        cells = options.search.max_positions * POSITION_FACTORS[min(d, len(POSITION_FACTORS)) - 1]
+        cells = options.search.cells(d)
         with one_thread():
             rows = Compressor(self._box(X), y, max_positions=cells).rows()
             problem = problem_of(rows, resolved_by=options.search.resolved_by)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""identify: from recordings to a model; fit_environment: from arrays to an identified force law."""
+"""identify: from recordings to a model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._typing import Float1D, Float2D
 from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
@@ -20,17 +19,15 @@ from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.roles import Informative, role_counts, unused_rows
-from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
-from .classes.findings import USABLE_NRMSE, identified, verdict_of
-from .classes.memory import IdentifyRest, better_with_memory
-from .classes.model_selection import select
-from .data.limits import ForceScale
+from .classes.findings import USABLE_NRMSE, verdict_of
+from .classes.memory import better_with_memory
 from .data.period import period_of, revolution_of
-from .data.rows import Rows, require_in_range, require_usable, rows_of
+from .data.rows import Rows, require_in_range, rows_of
 from .data.sections import in_sections
-from .log import Log, latest
+from .fit import fit_rows
+from .log import Log
 from .network.fitted import FittedNetwork
 from .network.separable import TINY
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
@@ -185,8 +182,7 @@ def _with_memory(
     """Returns the force law that is identified from the fitted recordings, with a memory if all recordings
     support it, the options with its period, and its rows."""
     network, chosen, rows = _fitted_with_period(fitted, options, objects)
-    rest = _resting(rows, chosen)
-    return better_with_memory(network, recordings, len(rows.force), chosen, rest), chosen, rows
+    return better_with_memory(network, recordings, len(rows.force), chosen), chosen, rows
 
 
 def _fitted_with_period(
@@ -272,108 +268,6 @@ def _reading_arguments() -> str:
 _show_options()
 
 
-def fit_environment(
-    positions: Float2D,
-    force: Float1D,
-    side: Float1D | None = None,
-    options: IdentifyOptions | None = None,
-    *,
-    starts: Sequence[int] | None = None,
-    names: Sequence[str] | None = None,
-    weight: Float1D | None = None,
-    within: float = 0.0,
-    units: Mapping[str, Unit] | None = None,
-) -> FittedNetwork:
-    """Identifies a force law from arrays.
-
-    Parameters
-    ----------
-    positions : (n, d)
-        Positions, which increase into the object, and further inputs of the force.
-    force : (n,)
-        Force of the object against the tool.
-    side : (n,), optional
-        Direction of each row: +1 into the object, -1 out of the object, 0 neither (left out of the test of
-        hysteresis).
-    options : IdentifyOptions, optional
-    starts : sequence of int, optional
-        Indices of rows at which a continuous motion starts. If `starts` is given without `side`, hysteresis
-        is tried with the play operator, s = (x - pi)/r (d = 1).
-    names : sequence of str, optional
-        Names of the inputs, for messages.
-    weight : (n,), optional
-        Number of samples that each row represents, above 0; by default 1.
-    within : float
-        Sum of squared differences of the samples from the force of their row, if a row represents several
-        samples.
-    units : mapping of str to Unit, optional
-        Units of position and force, for the messages.
-
-    Returns
-    -------
-    FittedNetwork
-
-    Raises
-    ------
-    palpate.InputError
-        The data cannot be identified, or the options name hysteresis and the data has no direction or motion.
-    """
-    options = options or IdentifyOptions()
-    given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
-    side = None if side is None else np.sign(side).astype(float)
-    rows = Rows(tuple(given), positions, force, side, None, starts, (), weight, within, options.period)
-    if units is not None:
-        rows = replace(rows, position_unit=units["position"], force_unit=units["force"])
-    return fit_rows(rows, options)
-
-
-def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
-    """Identifies a force law from rows, as :func:`fit_environment` does from arrays."""
-    require_usable(rows, options)
-    scale = ForceScale.of(rows.force, options)
-    return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
-
-
-def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
-    """Identifies without the rows of direction 0 if hysteresis is tested; if it is not accepted, identifies
-    again with all rows."""
-    side = rows.side
-    if side is not None and not ((side > 0).any() and (side < 0).any()):
-        rows, side = replace(rows, side=None), None
-    if (
-        side is None
-        or side[rows.reported].all()
-        or not (options.inputs == "auto" or "hysteresis" in options.inputs)
-    ):
-        return identified(select(rows, options))
-    found = identified(select(rows.only(side != 0), options))
-    if found.weight_hysteresis is not None:
-        left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not fitted."
-        return replace(found, log=found.log + Log(rows=[left_out]))
-    # hysteresis was refused, so rows without a direction need not be left out
-    every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
-    again = identified(select(every_row, options))
-    log = found.log + again.log
-    return replace(again, log=replace(log, decisions=latest(log.decisions)[0], findings=again.log.findings))
-
-
-def _resting(rows: Rows, options: IdentifyOptions) -> IdentifyRest:
-    """Returns the identification of a force at rest, a force of position alone."""
-    alone = replace(options, inputs=("position",))
-    units = {"position": rows.position_unit, "force": rows.force_unit}
-
-    def identified_at_rest(
-        position: Float1D, force: Float1D, rows: float, within: float, most_wavelets: int
-    ) -> FittedNetwork:
-        fewer = replace(alone, max_wavelets=min(alone.max_wavelets, most_wavelets))
-        weight = np.full(len(position), rows)
-        return fit_environment(
-            position[:, None], force, options=fewer, weight=weight, within=within, units=units
-        )
-
-    return identified_at_rest
-
-
 def model_of(
     network: FittedNetwork,
     units: Mapping[str, str],
@@ -390,7 +284,7 @@ def model_of(
         below=network.below,
         above=network.above,
         period=options.period,
-        memory=None if network.memory is None else network.memory.memory(),
+        memory=network.memory,
         play_radius=network.play_radius,
         mass=network.mass,
         damping=network.damping,
@@ -400,14 +294,10 @@ def model_of(
         notes={
             "model_selection": [str(decision) for decision in network.log.decisions],
             "rows": network.log.rows,
-            "identification": [
-                *network.log.notes,
-                *([network.shift.note] if network.shift and not network.shift.perceptible else []),
-                *network.band_check,
-            ],
+            "identification": [*network.log.notes, *network.remarks],
             "settled_nrmse": network.settled_nrmse[0],
             "left_out_nrmse": network.left_out_nrmse,
-            "shift_nrmse": network.shift.nrmse if network.shift else 0.0,
+            "shift_nrmse": network.shift_nrmse,
             "error_rows": network.residuals,
             "verdict": verdict.record(),
         },

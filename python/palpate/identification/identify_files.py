@@ -44,7 +44,8 @@ from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.rows import modulo, require_in_range
 from .data.strokes import DIRECTION_CURE, LEAST_KNOWN_SHARE
-from .identify import fit_environment, model_of
+from .fit import fit_environment
+from .identify import model_of
 from .log import Decision, Log, in_words
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from

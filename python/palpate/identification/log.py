@@ -50,21 +50,6 @@ class PathPoint:
     criterion: float
 
 
-@dataclass(frozen=True)
-class ShiftEffect:
-    """What changes in a model if press and release are shifted against each other in its rows."""
-
-    nrmse: float
-    """RMS change of the force, divided by the standard deviation of the force of the rows [-]"""
-    perceptible: bool
-    """True if a hand feels the change, or a good model has a smaller error"""
-    sentence: str
-
-    @property
-    def note(self) -> str:
-        return f"{self.sentence[0].upper()}{self.sentence[1:]}."
-
-
 @dataclass
 class Log:
     """What an identification reports, in order. The logs of two stages are added."""

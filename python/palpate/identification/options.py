@@ -29,6 +29,11 @@ CHOICES: dict[str, tuple[str, ...]] = {
 """Options whose value is one of several words, and the allowed words of each."""
 
 
+POSITION_FACTORS = (1, 2, 64)
+"""Largest number of distinct positions over that of one input, with one, two, and three or more inputs [-]. A
+regular grid over many inputs has few cells along each of them, so that the rows themselves are used there."""
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """Settings of the search for a network, which few identifications need to change.
@@ -74,6 +79,10 @@ class SearchOptions:
             raise InputError(f"play_radius is {shown(radii)}: must be a tuple of shares of the travel")
         for radius in radii:
             _require_number("play_radius", radius, 0.0)
+
+    def cells(self, inputs: int) -> int:
+        """Returns the largest number of distinct positions over a number of inputs."""
+        return self.max_positions * POSITION_FACTORS[min(inputs, len(POSITION_FACTORS)) - 1]
 
     @classmethod
     def parsed(cls, given: Mapping[str, str]) -> "SearchOptions":

@@ -17,7 +17,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...errors import InputError
-from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
 from ..log import Log, in_words
@@ -61,20 +60,12 @@ class ClassSelection:
     options : IdentifyOptions
     classes : sequence of ModelClass
         Model classes in the order in which they are tried, the simplest first.
-    cells : int
-        Largest number of distinct positions; with more, positions are gathered in cells.
     """
 
-    def __init__(
-        self,
-        data: Rows,
-        options: IdentifyOptions,
-        classes: Sequence[type[ModelClass]],
-        cells: int,
-    ) -> None:
-        self.data, self.options, self.classes, self.cells = data, options, classes, cells
+    def __init__(self, data: Rows, options: IdentifyOptions, classes: Sequence[type[ModelClass]]) -> None:
+        self.data, self.options, self.classes = data, options, classes
         self.log = Log()
-        self.samples = Samples(data, options, cells)
+        self.samples = Samples(data, options)
         self.judge = Judge(self.samples, options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
@@ -103,12 +94,12 @@ class ClassSelection:
 
     def repeated(self, data: Rows) -> ClassSelection:
         """Repeats this model selection on changed rows."""
-        return ClassSelection(data, self.options, self.classes, self.cells)
+        return ClassSelection(data, self.options, self.classes)
 
     @cached_property
-    def rows(self) -> Compressed:
-        """Rows of the recording, compressed without regard to the direction state."""
-        return self.samples.rows()
+    def problem(self) -> SeparableProblem:
+        """Least-squares problem of the rows without direction state."""
+        return self.samples.problem()
 
     def candidate(
         self,
@@ -117,16 +108,13 @@ class ClassSelection:
         solution: Solution,
         stop_reason: str,
         *,
-        rows: Compressed | None = None,
         strokes: HysteresisInput | None = None,
     ) -> Candidate:
-        """Returns the candidate model for a solution fitted to compressed rows; by default to rows without
-        direction state."""
+        """Returns the candidate model for a solution; by default one without direction state."""
         n_parameters = problem.n_parameters(solution.basis)
         if strokes is not None and strokes.play_radius is not None:
             n_parameters += 1
-        rows = rows or self.rows
-        return Candidate(model_class, self.data, rows, problem, solution, n_parameters, stop_reason, strokes)
+        return Candidate(model_class, self.data, problem, solution, n_parameters, stop_reason, strokes)
 
     @cached_property
     def motion(self) -> Dynamics | None:
@@ -168,8 +156,9 @@ class ClassSelection:
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
         if worse and len(kept.basis) and not all(bound.seam for bound in bounds):
-            moved = moved_to_bounds(problem, candidate.rows, candidate.solution, bounds)
-            compatible = self.samples.problem(moved, candidate.strokes)
+            rows = self.samples.rows(candidate.strokes)
+            moved = moved_to_bounds(problem, rows, candidate.solution, bounds)
+            compatible = self.samples.problem(candidate.strokes, moved)
             regrown = self.grown(compatible, candidate.solution.basis, candidate.model_class)
             trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
             if self._judged_on(regrown.problem, trial) < self._judged_on(regrown.problem, kept):
@@ -197,12 +186,12 @@ class ClassSelection:
     def above_press(self, free: Candidate) -> str:
         """Returns how far release is above press in a candidate without constraints, and where; an empty text
         if the difference is small."""
-        above = crossing(free.problem, free.solution)
-        if above is None:
+        found = crossing(free.problem, free.solution)
+        if found is None:
             return ""
-        lower, reach = float(self.data.lower[0]), float(self.data.reach[0])
-        places = self.data.position_unit.interval(lower + reach * above.start, lower + reach * above.end)
-        return f"release is up to {self.data.force_unit.text(above.height)} above press at {places}"
+        (height, *ends), lower, reach = found, float(self.data.lower[0]), float(self.data.reach[0])
+        places = self.data.position_unit.interval(*(lower + reach * end for end in ends))
+        return f"release is up to {self.data.force_unit.text(height)} above press at {places}"
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
         """Returns the constraints that the options require."""
@@ -289,7 +278,7 @@ class Network(ModelClass):
         selection, most = self._selection, self._selection.options.max_wavelets
         if below.problem.n_parameters(Basis.empty(below.problem.dimension), more=1) >= below.problem.samples:
             return below
-        problem = selection.samples.problem(selection.rows)
+        problem = selection.problem
         grown = selection.grown(problem, Basis.empty(problem.dimension), self.name, most)
         found = selection.candidate(self.name, grown.problem, grown.solution, grown.stop_reason)
         return selection.judge.better(below, selection.constrained(found))
@@ -299,7 +288,7 @@ def constant(selection: ClassSelection) -> Candidate:
     """Returns the candidate of model class constant, the mean force, with which every model selection
     starts."""
     straight = straight_line(selection)
-    rows, problem = straight.rows, straight.problem
+    rows, problem = selection.samples.rows(), straight.problem
     coefficients = np.zeros_like(straight.solution.coefficients)
     coefficients[0, 0] = float(np.average(rows.force, weights=rows.weight))
     level = problem.with_coefficients(straight.solution, coefficients)
@@ -313,6 +302,6 @@ def constant(selection: ClassSelection) -> Candidate:
 
 def straight_line(selection: ClassSelection) -> Candidate:
     """Returns the candidate of model class linear, a straight line, without constraints."""
-    problem = selection.samples.problem(selection.rows)
+    problem = selection.problem
     solution = problem.solve(Basis.empty(problem.dimension))
     return selection.candidate("linear", problem, solution, selection.options.criterion)

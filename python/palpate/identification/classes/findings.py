@@ -18,7 +18,7 @@ from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
 from ..data.strokes import weights_of_shared_errors
-from ..log import Decision, Log, ShiftEffect, causes_of_crossing, latest, shifted_strokes
+from ..log import Decision, Log, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
@@ -203,13 +203,16 @@ def place_findings(best: Judged) -> list[Finding]:
     ]
 
 
-def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
-    """Returns what changes in a model without the shift of press against release that the rows show; None
-    without such a shift, or if it changes less than the error on the rows. The change is that at the places
-    and directions of the rows."""
+def effect_of_shift(selection: ClassSelection) -> tuple[float, list[Finding], list[str]]:
+    """Returns the RMS change of a model without the shift of press against release that the rows show,
+    divided by the standard deviation of the force [-], and a finding; a note if a hand does not feel it.
+
+    The change is that at the places and directions of the rows. It is 0 without such a shift, or if it is
+    less than the error on the rows.
+    """
     best = selection.best
     if (shift := shift_of(selection)) is None:
-        return None
+        return 0.0, [], []
     data, unit, weight = best.data, best.data.force_unit, best.settled.weight
     box, side = data.box, np.zeros(len(weight)) if best.strokes is None else best.strokes.side
     (middle, half), (true_middle, true_half) = (
@@ -224,20 +227,21 @@ def effect_of_shift(selection: ClassSelection) -> ShiftEffect | None:
     spread, explained = best.error.spread or 1.0, 2.0 * shift.without.rmse**2 <= shift.before**2
     perceptible = max(rms, best.settled.rmse * explained) > USABLE_NRMSE * spread or worst > MOST_JND
     if not perceptible and rms < best.error.rmse:
-        return None
+        return 0.0, [], []
     amount, lag_s = data.position_unit.text(shift.amount * float(data.reach[0])), None
     if shift.late and explained:
         amount, lag_s = f"a force that is about {1e3 * shift.amount:.3g} ms late", shift.amount
     elif shift.late:  # the lag is not the only cause of the error, and its correction can raise it
         amount = "a late force"
     causes = shifted_strokes(bool(data.parts), lag_s)
-    return ShiftEffect(
-        rms / spread,
-        perceptible,
+    sentence = (
         f"press and release are shifted against each other, by {amount}: without it the RMS error falls from "
         f"{unit.interval(shift.before, shift.without.rmse)}, and the model changes by {unit.text(rms)} RMS, "
-        f"at one place by {worst:.2g} just noticeable differences; {causes}",
+        f"at one place by {worst:.2g} just noticeable differences; {causes}"
     )
+    if perceptible:
+        return rms / spread, [usable(sentence)], []
+    return rms / spread, [], [f"P{sentence[1:]}."]
 
 
 def energy_findings(best: Candidate) -> list[Finding]:
@@ -400,10 +404,10 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings += wait_findings(best, left)
     judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
-    shift = effect_of_shift(selection)
-    decisions += hidden_by_friction(best, decisions) if shift is None else []
+    shift_nrmse, of_shift, remarks = effect_of_shift(selection)
+    decisions += hidden_by_friction(best, decisions) if not (of_shift or remarks) else []
     findings += (
-        ([usable(shift.sentence)] if shift and shift.perceptible else [])
+        of_shift
         or log.findings
         or energy_findings(best)
         or limit_findings(best, options)
@@ -416,7 +420,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             "Rows behind turns share an error, because friction reverses there, and count less in the fit: "
             f"NRMSE {error.nrmse:.2g} on all rows, {settled.nrmse:.2g} with these weights."
         )
-    band, checked = band_with_check(best)
+    band, checked = band_with_check(selection)
     return replace(
         network,
         below=below,
@@ -431,7 +435,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         residual=best.residual,
         share=share,
         left_out_nrmse=replace(error, residual=left_out).nrmse,
-        shift=shift,
+        shift_nrmse=shift_nrmse,
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(
             best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]
@@ -444,5 +448,5 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             [*notes, *log.notes, *(f"Replaced decision: {each}." for each in replaced)],
             findings,
         ),
-        band_check=checked,
+        remarks=(*remarks, *checked),
     )

@@ -140,10 +140,9 @@ class Hysteresis(ModelClass):
         selection, judge = self._selection, self._selection.judge
         first = below.solution.basis if first is None else first
         strokes = self._weighted(strokes, first)
-        rows = selection.samples.rows(strokes)
-        problem = selection.samples.problem(rows, strokes)
+        problem = selection.samples.problem(strokes)
         start = problem.solve(first)
-        free = selection.candidate(self.name, problem, start, judge.criterion, rows=rows, strokes=strokes)
+        free = selection.candidate(self.name, problem, start, judge.criterion, strokes=strokes)
         if self._named or judge.fall(below, free) > 0.0:
             return self._grown(below, free, play)
         return free
@@ -187,13 +186,10 @@ class Hysteresis(ModelClass):
                 basis, searched = (basis if searched else Basis.empty(1)), True
             if complete and strokes is before:
                 break
-            rows = samples.rows(strokes)
             limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
-            grown = selection.grown(samples.problem(rows, strokes), basis, self.name, limit)
+            grown = selection.grown(samples.problem(strokes), basis, self.name, limit)
             basis, reason = grown.solution.basis, grown.stop_reason
-            found = selection.candidate(
-                self.name, grown.problem, grown.solution, reason, rows=rows, strokes=strokes
-            )
+            found = selection.candidate(self.name, grown.problem, grown.solution, reason, strokes=strokes)
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
         return found
 
@@ -205,7 +201,7 @@ class Hysteresis(ModelClass):
             return strokes
         order, share = data.order * data.fitted, self._selection.options.search.contact_share
         for _ in range(REWEIGHTINGS):
-            problem = samples.problem(samples.rows(strokes), strokes)
+            problem = samples.problem(strokes)
             found = self._selection.candidate(self.name, problem, problem.solve(basis), "", strokes=strokes)
             residual = data.force - found.force_at()
             weight = weights_of_shared_errors(data.path[:, 0], order, residual, data.force, share)
@@ -221,7 +217,7 @@ class Hysteresis(ModelClass):
         motion, would look like one rapidly changing force.
         """
         selection = self._selection
-        problem = selection.samples.problem(selection.rows)
+        problem = selection.problem
         start = problem.solve(hysteresis.solution.basis)
         problem = problem.with_prior(start.rss)
         problem, solution = selection.growth.prune(problem, problem.solve(start.basis))
@@ -361,7 +357,7 @@ class PlaySearch:
         influence.
         """
         strokes = replace(strokes, known=known, weight=None)
-        problem = self._samples.problem(self._samples.rows(strokes), strokes)
+        problem = self._samples.problem(strokes)
         return problem.total(problem.solve(basis).rss)
 
     def _thinned(self, strokes: HysteresisInput) -> NDArray[np.bool_]:

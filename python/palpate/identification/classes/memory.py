@@ -8,7 +8,7 @@ after each. Then the force at rest is identified as any force of position.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,16 +17,17 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns
+from ..._core.model import Memory, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.contact import contact_at
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocities
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
-from ..data.rows import rows_of
+from ..data.rows import Rows, rows_of
+from ..fit import fit_rows
 from ..log import Decision, Log, decided, lowered, squared_error_change
-from ..network.fitted import FittedMemory, FittedNetwork
+from ..network.fitted import FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
@@ -78,15 +79,8 @@ class Choice:
     fit: MemoryFit
     shape: Shape | None = None
 
-    def rss(self) -> float:
-        return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
-
     def rms(self) -> float:
         return float(np.sqrt(np.mean(self.fit.error(self.shape) ** 2)))
-
-    def value(self, rows: float, criterion: str) -> float:
-        used = 0 if self.shape is None else self.shape.n_parameters
-        return self.fit.value(self.rss(), used, rows, criterion)
 
 
 def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
@@ -99,7 +93,7 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
     kinds = [False] if recorded.ranges.log_tau is None else [True, False]
     found = [_grown(recorded, options, criterion, relaxes) for relaxes in kinds]
     rows = min(each.fit.independent(each.shape) for each in found)
-    return min(found, key=lambda each: each.value(rows, criterion))
+    return min(found, key=lambda each: each.fit.value(each.shape, rows, criterion))
 
 
 def _grown(recorded: Recorded, options: IdentifyOptions, criterion: str, relaxes: bool) -> Choice:
@@ -109,9 +103,9 @@ def _grown(recorded: Recorded, options: IdentifyOptions, criterion: str, relaxes
         expected = best.rms()
         current = replace(best, fit=recorded.fit(best.splines, expected))
         best, rows = current, current.fit.independent(current.shape)
-        value = current.value(rows, criterion) - options.search.evidence
+        value = current.fit.value(current.shape, rows, criterion) - options.search.evidence
         for trial in _larger(current, recorded, relaxes):
-            now = trial.value(rows, criterion)
+            now = trial.fit.value(trial.shape, rows, criterion)
             if now < value:
                 value, best = now, trial
         if best is current:
@@ -270,15 +264,23 @@ class Recorded:
         """Returns a fit with B-splines for the force at rest, for an expected RMS error."""
         return MemoryFit(self.motions, lambda box: _splines(box, SPLINES[splines]), self.least, rms)
 
-    def at_rest(self, choice: Choice, identify_rest: IdentifyRest) -> FittedNetwork:
+    def at_rest(self, choice: Choice, options: IdentifyOptions) -> FittedNetwork:
         """Returns the force at rest as an identified network."""
         assert choice.shape is not None
         box = np.linspace(0.0, 1.0, CURVE_POINTS)
         count = SPLINES[choice.splines]
         curve = _splines(box, count) @ choice.fit.solved(choice.shape)[0]
-        share = choice.fit.n_rows / CURVE_POINTS
-        within = self.spread**2 * choice.fit.n_rows * choice.rms() ** 2
-        return identify_rest(self.lower + self.travel * box, self.spread * curve, share, within, count)
+        rows = Rows(
+            ("position",),
+            (self.lower + self.travel * box)[:, None],
+            self.spread * curve,
+            weight=np.full(CURVE_POINTS, choice.fit.n_rows / CURVE_POINTS),
+            within=self.spread**2 * choice.fit.n_rows * choice.rms() ** 2,
+            position_unit=self.recordings[0].file_unit("position"),
+            force_unit=self.recordings[0].file_unit("force"),
+        )
+        most = min(options.max_wavelets, count)
+        return fit_rows(rows, replace(options, inputs=("position",), max_wavelets=most))
 
     def wavelets(self, network: FittedNetwork) -> Resting:
         """Returns the columns of a network for the force at rest: wavelets, slope and constant."""
@@ -289,7 +291,7 @@ class Recorded:
 
         return columns
 
-    def memory(self, shape: Shape, stiffness: Float1D) -> FittedMemory:
+    def memory(self, shape: Shape, stiffness: Float1D) -> Memory:
         """Returns a memory in the units of the recordings, with its branches in order of time constant."""
         relaxes, slips = np.full(len(shape.log_tau), np.inf), np.full(len(shape.log_yield), np.inf)
         time_constant_s = np.append(np.exp(shape.log_tau), slips)
@@ -297,7 +299,7 @@ class Recorded:
         order = np.lexsort([yield_stretch, time_constant_s])
         ratio = shape.ratio
         linear = ratio.linear / self.travel
-        return FittedMemory(
+        return Memory(
             alpha=ratio.alpha / self.travel,
             beta=self.lower + self.travel * ratio.beta,
             weight=ratio.weight,
@@ -353,12 +355,9 @@ def better_with_memory(
     recordings: Sequence[Recording],
     fitted_rows: int,
     options: IdentifyOptions,
-    identify_rest: IdentifyRest,
 ) -> FittedNetwork:
-    """Returns the model with memory if the recordings support it, else the model found without memory.
-
-    `found` was fitted to a number of rows of the recordings. `identify_rest` identifies the force at rest.
-    """
+    """Returns the model with memory if the recordings support it, else the model found without memory, which
+    was fitted to a number of rows of the recordings."""
     reason = untested(found, recordings, fitted_rows, options)
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
@@ -374,7 +373,7 @@ def better_with_memory(
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
         return _refused(found, _gain_text(in_sample, 0.0, moved))
-    at_rest = replace(recorded.at_rest(choice, identify_rest), below=recorded.below, above=recorded.above)
+    at_rest = replace(recorded.at_rest(choice, options), below=recorded.below, above=recorded.above)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
     refined = shape.without_idle(fit.solved(shape)[1])
@@ -524,11 +523,6 @@ def _gain_text(gain: float, error: float, moved: float) -> str:
     change = squared_error_change(gain, error, "held-out sections")
     compared = " compared with a zero or an object that changes" if moved else ""
     return f"{change}{compared}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
-
-
-IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
-"""Identifies a force of position from positions (n,), forces (n,), the number of rows that each represents,
-the sum of their squared errors, and the largest number of wavelets"""
 
 
 @dataclass(frozen=True)

@@ -229,9 +229,11 @@ class MemoryFit:
             parts.append(force[motion.touched])
         return np.concatenate(parts)
 
-    def residual(self, shape: Shape) -> Float1D:
+    def residual(self, shape: Shape | None) -> Float1D:
         """Returns force minus fitted force at the rows, then the weighted curvature of the fitted force
-        at rest."""
+        at rest; without branches for None."""
+        if shape is None:
+            return self._target
         free = self._free(self.columns(shape))
         return self._target - free @ _nonnegative(free, self._target)
 
@@ -261,18 +263,14 @@ class MemoryFit:
         better = shape.at(found.x)
         return better if self.rss(better) < self.rss(shape) else shape
 
-    def rss(self, shape: Shape) -> float:
-        """Returns the residual sum of squares."""
+    def rss(self, shape: Shape | None) -> float:
+        """Returns the residual sum of squares; without branches for None."""
         residual = self.residual(shape)
         return float(residual @ residual)
 
-    def static_rss(self) -> float:
-        """Returns the residual sum of squares without branches."""
-        return float(self._target @ self._target)
-
     def error(self, shape: Shape | None) -> Float1D:
         """Returns force minus fitted force at the rows; without branches for None."""
-        return (self._target if shape is None else self.residual(shape))[: self.n_rows]
+        return self.residual(shape)[: self.n_rows]
 
     def independent(self, shape: Shape | None) -> float:
         """Returns the number of independent rows of a residual; that without branches for None."""
@@ -280,9 +278,10 @@ class MemoryFit:
         rho = max(0.0, neighbour_correlation(residual))
         return max(LEAST_INDEPENDENT, independent_share(rho) * len(residual))
 
-    def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
-        """Returns the criterion of a memory."""
-        mean = max(rss / self.n_rows, self.least)
+    def value(self, shape: Shape | None, rows: float, criterion: str) -> float:
+        """Returns the criterion of a memory on a number of independent rows; without branches for None."""
+        mean = max(self.rss(shape) / self.n_rows, self.least)
+        n_parameters = 0 if shape is None else shape.n_parameters
         p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
         return deviance(criterion, rows * mean, rows, p)
 

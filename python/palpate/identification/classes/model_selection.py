@@ -38,17 +38,10 @@ SETTLED_INDEPENDENT_RATIO = 0.8
 """Ratio of the new to the previous share of independent rows, above which the model selection is not repeated
 [-]."""
 
-POSITION_FACTORS = (1, 2, 64)
-"""Largest number of distinct positions over that of one input, with one, two, and three or more inputs [-]. A
-regular grid over many inputs has few cells along each of them, so that the rows themselves are used there."""
-
 
 def select(rows: Rows, options: IdentifyOptions) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them."""
-    rows = rows.limited()
-    inputs = min(rows.box.shape[1], len(POSITION_FACTORS))
-    cells = options.search.max_positions * POSITION_FACTORS[inputs - 1]
-    found = correlated_noise(ClassSelection(rows, options, STATIC_CLASSES, cells))
+    found = correlated_noise(ClassSelection(rows.limited(), options, STATIC_CLASSES))
     found.try_classes(DYNAMIC_CLASSES)
     return no_finer_than_repeats(found)
 

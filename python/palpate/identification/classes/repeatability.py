@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
 from ...recording.motion import resolution_of
-from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
+from ..data.compression import HELD_OUT_EVERY, Compressor, inside
 from ..data.limits import distinct_rows
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.basis import Basis
@@ -53,12 +53,7 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
     coarse = replace(data, limits=replace(data.limits, force_error=least))
     smaller, size, too_few = first, best.n_wavelets, -1
     while size > too_few:
-        trial = ClassSelection(
-            coarse,
-            replace(options, max_wavelets=size),
-            first.classes,
-            first.cells,
-        )
+        trial = ClassSelection(coarse, replace(options, max_wavelets=size), first.classes)
         if trial.best.rmse <= least and trial.best.n_parameters <= best.n_parameters:
             smaller = trial
         elif smaller is first:
@@ -80,7 +75,7 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
     return smaller
 
 
-def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
+def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, ...]]:
     """Returns the band of a model and a note on its check; no band if the recordings cannot be compared, and
     no note for one recording.
 
@@ -88,17 +83,14 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     are fitted to the others with the wavelets of the model, and give a band. The RMS error and the share of
     rows in this band are those of the rows that were left out.
     """
-    repeats = best.data.repeats
+    best, repeats = selection.best, selection.best.data.repeats
     if repeats is None:
         return None, ()
     used = best.error.weight > 0.0
     band = None if _pure_error(best, repeats) is None else _band(best, best.residual, used, repeats)
     squares, rows, within, judged = 0.0, 0, 0, 0
     group, data = repeats.groups, best.data
-    force = best.static_force
-    compressor = Compressor(
-        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
-    )
+    force, compressor = best.static_force, _compressor(selection, data.weight)
     for number in np.unique(group[used]) if band is not None else ():
         others = used & (group != number)
         residual, left = _left_out(best, compressor, force, others, used & (group == number))
@@ -137,14 +129,7 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     """
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
-    force = best.static_force
-    compressor = Compressor(
-        data.box,
-        force,
-        weight=best.fit_weight,
-        max_positions=best.rows.cells,
-        limits=data.limits,
-    )
+    force, compressor = best.static_force, _compressor(selection, best.fit_weight)
     rows = np.flatnonzero(used)
     together = max(1, round(len(rows) / best.problem.independent))
     place = [np.rint(column / resolution_of(column)) for column in data.box[rows].T]
@@ -163,6 +148,14 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
         )
         residual[left] = again[left]
     return residual
+
+
+def _compressor(selection: ClassSelection, weight: Float1D | None) -> Compressor:
+    """Returns the rows of the best candidate with weights (n,), without the forces of mass and damping."""
+    data, cells = selection.best.data, selection.options.search.cells(len(selection.best.data.names))
+    return Compressor(
+        data.box, selection.best.static_force, weight=weight, max_positions=cells, limits=data.limits
+    )
 
 
 def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
@@ -205,4 +198,4 @@ def _left_out(
     rows = compressor.rows(best.side, fitted)
     problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
     solution = fit(problem, best.solution.basis)
-    return problem.errors(solution, HeldOutRows(np.ascontiguousarray(data.box), force, best.side)), left
+    return force - problem.force(solution, np.ascontiguousarray(data.box), best.side), left

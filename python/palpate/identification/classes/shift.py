@@ -82,8 +82,7 @@ def _shift_of(selection: ClassSelection) -> Shift | None:
         """Returns the refined wavelets for other positions (n,) of the rows."""
         ends = data.lower, data.lower + data.reach
         rows = replace(data, positions=position[:, None], corners=ends, weight=weight)
-        samples = Samples(rows, options, selection.cells)
-        problem = samples.problem(samples.rows(strokes), strokes)
+        problem = Samples(rows, options).problem(strokes)
         return problem, selection.growth.refined(problem, best.solution.basis)
 
     def at(position: Float1D) -> Candidate:

@@ -62,9 +62,6 @@ class Compressed:
     resolution of the force"""
     scatter: float = 0.0
     """Mean squared distance of the samples of a row from its position, along the first input"""
-    cells: int = 0
-    """Largest number of distinct positions; if a recording has more, its rows are gathered in this number of
-    position cells"""
 
     def reweighted_to(self, samples: float) -> Compressed:
         """Returns the rows with weights scaled so that together they represent `samples` rows of the
@@ -102,7 +99,7 @@ class Compressor:
         within: float = 0.0,
         limits: RowLimits = NO_LIMITS,
     ) -> None:
-        self._within, self._limits, self._cells = within, limits, max_positions
+        self._within, self._limits = within, limits
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
         """Indices of the recorded rows that are used: rows with a weight above 0, or an even selection of
         them."""
@@ -160,7 +157,7 @@ class Compressor:
         within = self._within + float(dy @ (weight * dy))
         samples = float(weight.sum())
         scatter = float(weight @ dx[:, 0] ** 2) / samples
-        return Compressed(x, y, count, merged_side, within, samples, self._limits, scatter, self._cells)
+        return Compressed(x, y, count, merged_side, within, samples, self._limits, scatter)
 
     def _part(self, share: NDArray[Any]) -> Compressor:
         """Returns a compressor of the rows with a share above 0, which multiplies their weights, with the
@@ -257,7 +254,7 @@ correlated."""
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """Rows, usually held-out ones, at which the force of a network is computed; positions in the unit box."""
+    """Held-out rows; positions in the unit box."""
 
     positions: Float2D
     """(k, d)"""
@@ -270,14 +267,6 @@ class HeldOutRows:
         return HeldOutRows(
             np.ascontiguousarray(positions[index]), force[index], None if side is None else side[index]
         )
-
-    def errors(self, readings: Float2D, wavelets: Float2D) -> Float1D:
-        """Returns the recorded force minus the force of a network (k,); `readings` (1 or 2, 1 + d + N) are
-        its coefficients of mean force and hysteresis, `wavelets` (k, N) its wavelets at the positions."""
-        columns = np.concatenate([np.ones((len(self.force), 1)), self.positions, wavelets], axis=1)
-        channels = columns @ readings.T
-        modelled = channels[:, 0] if self.side is None else channels[:, 0] + self.side * channels[:, -1]
-        return np.asarray(self.force - modelled)
 
     def in_jnd(self, errors: Float1D) -> Float1D:
         """Returns errors (k,) in just noticeable differences: 7 % of the local force, at least 1 % of the

@@ -122,12 +122,23 @@ class Basis:
         return found
 
 
+MOST_TREE_INPUTS = 3
+"""Largest number of inputs for which a tree finds the nearest positions faster than a list of all
+distances."""
+
+MOST_DISTANCES = 4096
+"""Largest number of positions whose distances to a place are computed. Of more positions a random part is
+used."""
+
+
 class Resolution:
     """Computes distances from a place to the nearest distinct positions of a set of positions (m, d)."""
 
     def __init__(self, positions: Float2D) -> None:
         self._positions = positions[distinct_rows(positions)[0]]
-        self._neighbours: dict[int, _Neighbours] = {}
+        self._subsets: dict[int, Resolution] = {}
+        """Positions over some of the inputs k, by the sum of 2^k"""
+        self._middles: dict[int, Float1D] = {}
 
     def __len__(self) -> int:
         return len(self._positions)
@@ -146,66 +157,47 @@ class Resolution:
         infinite if there are fewer positions.
         """
         if self._positions.shape[1] == 1:
-            return self._over(1).reach(basis.beta, count)
+            return self._around(basis.beta, count)
         bits = 1 << np.arange(basis.beta.shape[1])
         subset, radius = basis.used @ bits, np.empty(len(basis))
         for code in np.unique(subset):
             inputs, those = np.flatnonzero(code & bits), subset == code
-            radius[those] = self._over(int(code)).reach(basis.beta[those][:, inputs], count)
+            if code not in self._subsets:
+                self._subsets[code] = Resolution(self._positions[:, inputs])
+            radius[those] = self._subsets[code]._around(basis.beta[those][:, inputs], count)
         return radius
 
-    def _over(self, code: int) -> "_Neighbours":
-        """Returns the positions over a set of inputs k, given by the sum of 2^k."""
-        if code not in self._neighbours:
-            inputs = [k for k in range(self._positions.shape[1]) if code >> k & 1]
-            self._neighbours[code] = _Neighbours(self._positions[:, inputs])
-        return self._neighbours[code]
+    @cached_property
+    def _compared(self) -> Float2D:
+        """Positions whose distances are computed"""
+        if self._positions.shape[1] <= MOST_TREE_INPUTS or len(self) <= MOST_DISTANCES:
+            return self._positions
+        return np.random.default_rng(0).choice(self._positions, MOST_DISTANCES, replace=False)
 
+    @cached_property
+    def _tree(self) -> scipy.spatial.cKDTree:
+        return scipy.spatial.cKDTree(self._compared)
 
-MOST_TREE_INPUTS = 3
-"""Largest number of inputs for which a tree finds the nearest positions faster than a list of all
-distances."""
-
-MOST_DISTANCES = 4096
-"""Largest number of positions whose distances to a place are computed. Of more positions a random part is
-used."""
-
-
-class _Neighbours:
-    """Distinct positions of a set of positions (m, d), sorted or in a tree if there are few inputs."""
-
-    def __init__(self, positions: Float2D) -> None:
-        distinct = positions[distinct_rows(positions)[0]]
-        d = positions.shape[1]
-        self._share = 1.0 if d <= MOST_TREE_INPUTS else min(1.0, MOST_DISTANCES / len(distinct))
-        if self._share < 1.0:
-            distinct = np.random.default_rng(0).choice(distinct, MOST_DISTANCES, replace=False)
-        self._positions = distinct
-        self._sorted = distinct[:, 0] if d == 1 else None
-        self._tree = scipy.spatial.cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
-        self._size = len(distinct)
-        self._middles: dict[int, Float1D] = {}
-
-    def reach(self, places: Float2D, count: int) -> Float1D:
+    def _around(self, places: Float2D, count: int) -> Float1D:
         """Returns the radius (N,) around each place (N, d) that contains `count` positions; infinite if there
         are fewer."""
-        if self._share < 1.0:
-            count = max(2, round(self._share * count))
-        if count > self._size:
+        positions, d = self._compared, places.shape[1]
+        if len(positions) < len(self):
+            count = max(2, round(len(positions) / len(self) * count))
+        if count > len(positions):
             return np.full(len(places), np.inf)
-        if self._tree is not None:
+        if 1 < d <= MOST_TREE_INPUTS:
             return np.asarray(self._tree.query(places, k=[count])[0])[:, 0]
-        if self._sorted is None:
-            square = scipy.spatial.distance.cdist(places, self._positions, "sqeuclidean")
+        if d > 1:
+            square = scipy.spatial.distance.cdist(places, positions, "sqeuclidean")
             return np.asarray(np.sqrt(np.partition(square, count - 1, axis=1)[:, count - 1]))
         # On a line the nearest positions are neighbours in order, with their middle next to the place.
+        line, place, most = positions[:, 0], places[:, 0], len(positions) - count
         if count not in self._middles:
-            first, last = self._sorted[: self._size - count + 1], self._sorted[count - 1 :]
-            self._middles[count] = 0.5 * (first + last)
-        place = places[:, 0]
+            self._middles[count] = 0.5 * (line[: most + 1] + line[count - 1 :])
         above = np.searchsorted(self._middles[count], place)
-        first = np.array([np.maximum(above - 1, 0), np.minimum(above, self._size - count)])
-        left, right = self._sorted[first], self._sorted[first + (count - 1)]
+        first = np.array([np.maximum(above - 1, 0), np.minimum(above, most)])
+        left, right = line[first], line[first + (count - 1)]
         return np.asarray(np.maximum(place - left, right - place).min(axis=0))
 
 

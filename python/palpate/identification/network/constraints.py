@@ -339,21 +339,9 @@ REPORTED_HEIGHT = 3.0
 larger than noise."""
 
 
-@dataclass(frozen=True)
-class Crossing:
-    """Interval of positions in which the release force is above the press force."""
-
-    height: float
-    """Largest release force minus press force [force]"""
-    start: float
-    """[box]"""
-    end: float
-    """[box]"""
-
-
-def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
-    """Returns the interval where the release force exceeds the press force most; None if the difference is
-    small.
+def crossing(problem: SeparableProblem, free: Solution) -> tuple[float, float, float] | None:
+    """Returns the largest release force minus press force [force], and start and end [box] of the interval in
+    which it is above 0; None if it is small.
 
     `free` is a fitted force g + s h without the constraint h >= 0. With one block of rows for each stroke,
     only positions measured on both strokes are used.
@@ -372,4 +360,4 @@ def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
     within = np.flatnonzero(above <= 0.0)
     start = within[within < deepest].max(initial=-1) + 1
     end = within[within > deepest].min(initial=COMPARED_POSITIONS) - 1
-    return Crossing(float(above[deepest]), float(places[start]), float(places[end]))
+    return float(above[deepest]), float(places[start]), float(places[end])

@@ -15,34 +15,8 @@ from ...model import Fit, PathStep
 from ...model.band import Band
 from ...recording.units import UNSTATED_UNIT, Unit
 from ..data.limits import ForceScale
-from ..log import Log, ShiftEffect
+from ..log import Log
 from .separable import Solution
-
-
-@dataclass(frozen=True)
-class FittedMemory:
-    """Identified branches that relax, and the ratio p of their coordinate to the position."""
-
-    alpha: Float1D
-    """(m,) dilations of the wavelets of the ratio [1/position]"""
-    beta: Float1D
-    """(m,) translations [position]"""
-    weight: Float1D
-    """(m,) weights [-]"""
-    linear: float
-    """Slope of the ratio [1/position]"""
-    bias: float
-    """Constant of the ratio [-]"""
-    stiffness: Float1D
-    """(J,) stiffness of each branch [force/position]"""
-    time_constant_s: Float1D
-    """(J,) time constant of each branch, infinite if it does not relax [s]"""
-    yield_stretch: Float1D
-    """(J,) stretch at which each branch slips, infinite if it does not [position]"""
-
-    def memory(self) -> Memory:
-        """Returns the memory of a model."""
-        return Memory(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -83,7 +57,7 @@ class FittedNetwork:
     """Object mass m of F = m a + B v + f, if it was fitted [force s^2/position]"""
     damping: float | None = None
     """Object damping B of F = m a + B v + f, if it was fitted [force s/position]"""
-    memory: FittedMemory | None = None
+    memory: Memory | None = None
     """Branches that relax, in addition to the force at rest g; None for a force without memory"""
     model_class: str = ""
     """Name of the accepted model class"""
@@ -109,8 +83,9 @@ class FittedNetwork:
     """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
     left_out_nrmse: float = 0.0
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
-    shift: ShiftEffect | None = None
-    """Effect of a shift of press against release; None if the rows show none"""
+    shift_nrmse: float = 0.0
+    """RMS change of the force by a shift of press against release, divided by the standard deviation of the
+    force [-]; 0 if the rows show no shift"""
     residuals: int = 0
     """Number of rows with a residual"""
     residual_correlation: float = 0.0
@@ -120,8 +95,8 @@ class FittedNetwork:
     correlated"""
     band: Band | None = None
     """Band of a further recording; None for one recording"""
-    band_check: tuple[str, ...] = ()
-    """Sentence on the check of the band, or on a missing band; empty for one recording"""
+    remarks: tuple[str, ...] = ()
+    """Sentences on a shift that a hand does not feel, and on the check of the band or its absence"""
     log: Log = field(default_factory=Log)
     """Tested networks, decisions, sentences and findings"""
 
@@ -147,7 +122,7 @@ class FittedNetwork:
         period = float(self.upper[0] - self.lower[0]) if self.harmonics else None
         law = self.parameters()
         if self.memory is not None:
-            law |= {"below": self.below, "above": self.above, "memory": self.memory.memory()}
+            law |= {"below": self.below, "above": self.above, "memory": self.memory}
         return ForceModel(**law, period=period)
 
     def fit(self) -> Fit:

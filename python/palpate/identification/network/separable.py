@@ -251,9 +251,12 @@ class SeparableProblem:
             for left in solution.residuals
         )
 
-    def errors(self, solution: Solution, rows: HeldOutRows) -> Float1D:
-        """Returns the recorded force minus the force of a solution at held-out rows."""
-        return rows.errors(self.readout @ solution.coefficients, solution.basis.columns(rows.positions))
+    def force(self, solution: Solution, positions: Float2D, side: Float1D | None) -> Float1D:
+        """Returns the force (k,) of a solution at positions (k, d), with direction states (k,)."""
+        wavelets = solution.basis.columns(positions)
+        columns = np.concatenate([np.ones((len(positions), 1)), positions, wavelets], axis=1)
+        channels = columns @ (self.readout @ solution.coefficients).T
+        return np.asarray(channels[:, 0] if side is None else channels[:, 0] + side * channels[:, -1])
 
     def with_prior(self, rss: float) -> SeparableProblem:
         """Returns the problem with a penalty on weights that are large compared with the range of the force.

@@ -116,7 +116,8 @@ def criterion_of(
         rows = problem.held_out
         if rows is None:
             raise InputError(f"criterion is {name!r}: needs held-out rows, and no rows are held out")
-        return held_out_deviance(name, rows, problem.errors(solution, rows))
+        errors = rows.force - problem.force(solution, rows.positions, rows.side)
+        return held_out_deviance(name, rows, errors)
     p = problem.n_parameters(solution.basis) if n_parameters is None else n_parameters
     share = problem.limits.independent
     return deviance(name, share * problem.total(solution.rss), problem.independent, p)
@@ -209,7 +210,6 @@ class Candidate:
     model_class: str
     data: Rows
     """All rows of the recording, on which the error of the candidate is reported"""
-    rows: Compressed
     problem: SeparableProblem
     solution: Solution
     n_parameters: int
@@ -290,7 +290,7 @@ class Candidate:
         return middle, self._force(positions, np.ones(len(positions))) - middle
 
     def _force(self, positions: Float2D, side: Float1D | None) -> Float1D:
-        return -self.problem.errors(self.solution, HeldOutRows(positions, np.zeros(len(positions)), side))
+        return self.problem.force(self.solution, positions, side)
 
     @cached_property
     def network(self) -> FittedNetwork:
@@ -345,17 +345,15 @@ class Samples:
     ----------
     data : Rows
     options : IdentifyOptions
-    cells : int
-        Largest number of distinct positions; with more, neighbouring positions are replaced by their mean.
     """
 
-    def __init__(self, data: Rows, options: IdentifyOptions, cells: int) -> None:
+    def __init__(self, data: Rows, options: IdentifyOptions) -> None:
         self.data, self._held_out = data, data.held_out()
         self._compressor = Compressor(
             data.box,
             data.force,
             weight=data.weight,
-            max_positions=cells,
+            max_positions=options.search.cells(len(data.names)),
             within=data.within,
             limits=data.limits,
         )
@@ -379,8 +377,11 @@ class Samples:
             rows = rows.reweighted_to(self._compressor.samples(only))
         return rows if self.data.period is None else around_seam(rows)
 
-    def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:
-        """Returns the least-squares problem of compressed rows."""
+    def problem(
+        self, strokes: HysteresisInput | None = None, rows: Compressed | None = None
+    ) -> SeparableProblem:
+        """Returns the least-squares problem of compressed rows with direction states; by default of all."""
+        rows = self.rows(strokes) if rows is None else rows
         held_out = self.held_out_rows(strokes) if self._for_criterion else None
         return problem_of(rows, resolved_by=self._resolved_by, held_out=held_out)
 

@@ -180,7 +180,7 @@ def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
 
     def states(position: Array, force: Array, role: Int8Vector) -> list[Array]:
         rows = Rows(("position",), position[:, None], force, starts=(0,), role=role, corners=BOX).limited()
-        found = PlaySearch(Samples(rows, options, 1024), options).best_of_options(Basis.empty(1))
+        found = PlaySearch(Samples(rows, options), options).best_of_options(Basis.empty(1))
         return [each.side[rows.fitted] for each in found]
 
     alone = states(x, force, role)

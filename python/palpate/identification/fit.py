@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Identifies a force law from arrays or from rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .._typing import Float1D, Float2D
+from ..recording.units import Unit
+from .classes.findings import identified
+from .classes.model_selection import select
+from .data.limits import ForceScale
+from .data.rows import Rows, require_usable
+from .log import Log, latest
+from .network.fitted import FittedNetwork
+from .options import IdentifyOptions
+
+
+def fit_environment(
+    positions: Float2D,
+    force: Float1D,
+    side: Float1D | None = None,
+    options: IdentifyOptions | None = None,
+    *,
+    starts: Sequence[int] | None = None,
+    names: Sequence[str] | None = None,
+    weight: Float1D | None = None,
+    within: float = 0.0,
+    units: Mapping[str, Unit] | None = None,
+) -> FittedNetwork:
+    """Identifies a force law from arrays.
+
+    Parameters
+    ----------
+    positions : (n, d)
+        Positions, which increase into the object, and further inputs of the force.
+    force : (n,)
+        Force of the object against the tool.
+    side : (n,), optional
+        Direction of each row: +1 into the object, -1 out of the object, 0 neither (left out of the test of
+        hysteresis).
+    options : IdentifyOptions, optional
+    starts : sequence of int, optional
+        Indices of rows at which a continuous motion starts. If `starts` is given without `side`, hysteresis
+        is tried with the play operator, s = (x - pi)/r (d = 1).
+    names : sequence of str, optional
+        Names of the inputs, for messages.
+    weight : (n,), optional
+        Number of samples that each row represents, above 0; by default 1.
+    within : float
+        Sum of squared differences of the samples from the force of their row, if a row represents several
+        samples.
+    units : mapping of str to Unit, optional
+        Units of position and force, for the messages.
+
+    Returns
+    -------
+    FittedNetwork
+
+    Raises
+    ------
+    palpate.InputError
+        The data cannot be identified, or the options name hysteresis and the data has no direction or motion.
+    """
+    options = options or IdentifyOptions()
+    given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
+    side = None if side is None else np.sign(side).astype(float)
+    rows = Rows(tuple(given), positions, force, side, None, starts, (), weight, within, options.period)
+    if units is not None:
+        rows = replace(rows, position_unit=units["position"], force_unit=units["force"])
+    return fit_rows(rows, options)
+
+
+def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
+    """Identifies a force law from rows, as :func:`fit_environment` does from arrays."""
+    require_usable(rows, options)
+    scale = ForceScale.of(rows.force, options)
+    return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
+
+
+def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
+    """Identifies without the rows of direction 0 if hysteresis is tested; if it is not accepted, identifies
+    again with all rows."""
+    side = rows.side
+    if side is not None and not ((side > 0).any() and (side < 0).any()):
+        rows, side = replace(rows, side=None), None
+    if (
+        side is None
+        or side[rows.reported].all()
+        or not (options.inputs == "auto" or "hysteresis" in options.inputs)
+    ):
+        return identified(select(rows, options))
+    found = identified(select(rows.only(side != 0), options))
+    if found.weight_hysteresis is not None:
+        left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not fitted."
+        return replace(found, log=found.log + Log(rows=[left_out]))
+    # hysteresis was refused, so rows without a direction need not be left out
+    every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
+    again = identified(select(every_row, options))
+    log = found.log + again.log
+    return replace(again, log=replace(log, decisions=latest(log.decisions)[0], findings=again.log.findings))
