@@ -78,7 +78,8 @@ def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     """Identifies a force law from rows, as :func:`fit_environment` does from arrays."""
     require_usable(rows, options)
     scale = ForceScale.of(rows.force, options)
-    return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
+    found = _fitted(rows.scaled(scale), scale.scaled_options(options))
+    return replace(found.unscaled(scale, rows.force_unit), rows=rows)
 
 
 def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:

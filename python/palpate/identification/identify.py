@@ -24,7 +24,7 @@ from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import USABLE_NRMSE, verdict_of
 from .classes.memory import better_with_memory
 from .data.period import period_of, revolution_of
-from .data.rows import Rows, require_in_range, rows_of
+from .data.rows import require_in_range, rows_of
 from .data.sections import in_sections
 from .fit import fit_rows
 from .log import Log
@@ -146,76 +146,64 @@ def identify(
             require_in_range(name, column)
     fitted, sections = in_sections(recordings)
     with one_thread():
-        network, chosen, rows = _with_memory(recordings, fitted, settings, object_of)
+        network = _identified(recordings, fitted, settings, object_of)
         if not sections and network.residual is not None and len(network.residual) == sum(map(len, fitted)):
             # Rows behind a turn with a small weight share an error: none of them is wrong alone.
             counted = network.residual * (1.0 if network.share is None else network.share)
             residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
             if informative.drop_wrong_readings(residuals):
                 fitted = recordings = informative.recordings
-                network, chosen, rows = _with_memory(recordings, fitted, settings, object_of)
+                network = _identified(recordings, fitted, settings, object_of)
+    rows = network.rows
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
     network = replace(network, log=Log(rows=[*informative.notes, *unused, *sections]) + network.log)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
-    known = rows.order if rows.side is None else rows.side
-    attracts = chosen.below == "linear"
-    verdict = verdict_of(network, recordings, known if every_row else None, attracts)
-    model = model_of(network, recordings[0].units, source, chosen, verdict)
+    attracts = settings.below == "linear"
+    verdict = verdict_of(network, recordings, rows.direction if every_row else None, attracts)
+    model = model_of(network, recordings[0].units, source, verdict)
     left_out = sum(map(len, recordings)) - len(rows.force)
     model.notes["roles"] = (
         role_counts(rows.roles) | informative.dropped | ({"left out": left_out} if left_out else {})
     )
     if (steepest := SteepestSlope.of(model)) is not None:
-        on_it = rows.fitted & steepest.rows(rows.domain[:, 0], known)
+        on_it = rows.fitted & steepest.rows(rows.domain[:, 0], rows.direction)
         model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))
     return model
 
 
-def _with_memory(
+def _identified(
     recordings: Sequence[Recording],
     fitted: Sequence[Recording],
     options: IdentifyOptions,
     objects: Sequence[int],
-) -> tuple[FittedNetwork, IdentifyOptions, Rows]:
+) -> FittedNetwork:
     """Returns the force law that is identified from the fitted recordings, with a memory if all recordings
-    support it, the options with its period, and its rows."""
-    network, chosen, rows = _fitted_with_period(fitted, options, objects)
-    return better_with_memory(network, recordings, len(rows.force), chosen), chosen, rows
-
-
-def _fitted_with_period(
-    recordings: Sequence[Recording], options: IdentifyOptions, objects: Sequence[int]
-) -> tuple[FittedNetwork, IdentifyOptions, Rows]:
-    """Returns the identified force law, the options with the period that it has, and its rows.
+    support it.
 
     If the force repeats over position, or the angle closes a revolution, a good periodic force law is taken.
     Otherwise it is compared with one that is not periodic.
     """
     searched = options.period is None and options.inputs == "auto"
-    found = [period_of(recordings), revolution_of(recordings)] if searched else []
-    tried = []
+    found = [period_of(fitted), revolution_of(fitted)] if searched else []
+    rows, tried = rows_of(fitted, options, objects), []
     for period in [*(each for each in found if each is not None), options.period]:
-        chosen = replace(options, period=period)
-        rows = rows_of(recordings, chosen, objects)
-        tried.append((fit_rows(rows, chosen), chosen, rows))
-        if period is not None and tried[-1][0].nrmse <= USABLE_NRMSE:
+        tried.append(fit_rows(replace(rows, period=period), replace(options, period=period)))
+        if period is not None and tried[-1].nrmse <= USABLE_NRMSE:
             break
 
-    n = min(min(each.independent_rows, each.residuals) for each, *_ in tried)
+    n = min(min(each.independent_rows, each.residuals) for each in tried)
 
     def value(network: FittedNetwork) -> float:
         return deviance("bic", max(network.rmse**2, TINY) * n, n, network.n_parameters)
 
-    network, chosen, rows = tried[-1]
-    if chosen.period is None and len(tried) > 1:
-        network, chosen, rows = min(reversed(tried), key=lambda each: value(each[0]))
-    if chosen.period is not None and searched:
-        text = recordings[0].file_unit("position").text(chosen.period)
+    network = tried[-1] if tried[-1].period is not None else min(reversed(tried), key=value)
+    if network.period is not None and searched:
+        text = fitted[0].file_unit("position").text(network.period)
         note = f"The force repeats every {text}: positions are taken modulo this period (--period)."
         network = replace(network, log=Log(notes=[note]) + network.log)
-    return network, chosen, rows
+    return better_with_memory(network, recordings, options)
 
 
 def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
@@ -268,13 +256,7 @@ def _reading_arguments() -> str:
 _show_options()
 
 
-def model_of(
-    network: FittedNetwork,
-    units: Mapping[str, str],
-    source: Source,
-    options: IdentifyOptions,
-    verdict: Verdict,
-) -> Model:
+def model_of(network: FittedNetwork, units: Mapping[str, str], source: Source, verdict: Verdict) -> Model:
     """Returns the model of an identified network, with its verdict."""
     return Model(
         kind=_kind(network),
@@ -283,7 +265,7 @@ def model_of(
         **network.parameters(),
         below=network.below,
         above=network.above,
-        period=options.period,
+        period=network.period,
         memory=network.memory,
         play_radius=network.play_radius,
         mass=network.mass,

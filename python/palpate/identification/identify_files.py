@@ -306,7 +306,6 @@ def _identified(
         network,
         recordings[0].units,
         replace(source, rows=int(summary.rows)),
-        settings,
         verdict_of(network, ()),
     )
 

@@ -25,7 +25,7 @@ from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
 from ..identification.network.basis import Basis
 from ..identification.network.constraints import domain_bounds, impose, slope_limited
-from ..identification.network.fitted import FittedNetwork
+from ..identification.network.fitted import parameters_of
 from ..identification.network.separable import Block, SeparableProblem
 from ..identification.threads import one_thread
 from .plan import SAMPLES, strokes, with_network
@@ -253,7 +253,7 @@ def _fitted(
     lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
     bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
     solution = impose(problem, problem.solve(basis), bounds)
-    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=("position",)).parameters()
+    found = parameters_of(solution, problem.readout, lower, travel)
     new = {
         name: value for name, value in found.items() if name not in ("lower", "upper") and value is not None
     }

@@ -157,8 +157,8 @@ def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
 def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
     """Returns an identified network that has a residual on all rows."""
     assert network.residual is not None
-    side = rows.order if rows.side is None else rows.side
-    return Judged(rows, network.residual, rows.fitted.astype(float), side, _inputs(network))
+    inputs = _inputs(network)
+    return Judged(rows, network.residual, rows.fitted.astype(float), rows.direction, inputs)
 
 
 def place_findings(best: Judged) -> list[Finding]:

@@ -311,12 +311,10 @@ class Recorded:
         )
 
 
-def untested(
-    found: FittedNetwork, recordings: Sequence[Recording], fitted_rows: int, options: IdentifyOptions
-) -> str | None:
+def untested(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> str | None:
     """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
     tested."""
-    automatic = options.inputs == "auto" and options.period is None
+    automatic = options.inputs == "auto" and found.period is None
     in_order = all(part.time is not None or _in_order(part) for part in recordings)
     if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
         return ""
@@ -327,7 +325,7 @@ def untested(
     spread = found.rmse / found.nrmse if found.nrmse else math.inf
     if (nrmse := found.rmse_of_all / spread) < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
-    every_second = 2 * found.residuals >= fitted_rows
+    every_second = 2 * found.residuals >= len(found.rows.force)
     upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
     if every_second and upper < LEAST_CORRELATION:
         return (
@@ -351,14 +349,10 @@ def _unsupported(options: IdentifyOptions) -> str | None:
 
 
 def better_with_memory(
-    found: FittedNetwork,
-    recordings: Sequence[Recording],
-    fitted_rows: int,
-    options: IdentifyOptions,
+    found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions
 ) -> FittedNetwork:
-    """Returns the model with memory if the recordings support it, else the model found without memory, which
-    was fitted to a number of rows of the recordings."""
-    reason = untested(found, recordings, fitted_rows, options)
+    """Returns the model with memory if the recordings support it, else the model found without memory."""
+    reason = untested(found, recordings, options)
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
         return replace(found, log=found.log + Log(decisions=[decision])) if reason else found
@@ -440,6 +434,7 @@ def better_with_memory(
     left_out_nrmse *= recorded.spread / recorded.judged_spread
     network = replace(
         network,
+        rows=found.rows,
         model_class="memory",
         n_parameters=n_parameters,
         rmse=of_all,

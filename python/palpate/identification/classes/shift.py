@@ -63,7 +63,7 @@ def shift_of(selection: ClassSelection) -> Shift | None:
 def _shift_of(selection: ClassSelection) -> Shift | None:
     best, options = selection.best, selection.options
     data = best.data
-    side = data.order if data.side is None else data.side
+    side = data.direction
     if side is None or len(data.names) > 1 or best.moving is not None:
         return None  # a late force also looks like a mass and a damping, which are subtracted here
     known = side != 0.0

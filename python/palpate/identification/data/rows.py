@@ -118,6 +118,11 @@ class Rows:
         return self.path if self.period is None else modulo(self.path)
 
     @property
+    def direction(self) -> Float1D | None:
+        """(n,) direction of each row, from `order` if `side` is not known; None if neither is known."""
+        return self.order if self.side is None else self.side
+
+    @property
     def domain(self) -> Float2D:
         """(n, d) positions; those of a periodic force law are moved into one repeat length."""
         return self.positions if self.period is None else self.lower + self.box * self.reach

@@ -15,8 +15,18 @@ from ...model import Fit, PathStep
 from ...model.band import Band
 from ...recording.units import UNSTATED_UNIT, Unit
 from ..data.limits import ForceScale
+from ..data.rows import Rows
 from ..log import Log
 from .separable import Solution
+
+HYSTERESIS = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+
+PARAMETERS = (
+    *("alpha", "beta", "weight", "linear", "bias"),
+    *HYSTERESIS,
+    *("harmonics", "lower", "upper"),
+)
+"""Fields of :class:`FittedNetwork` that are keyword arguments of :class:`ForceModel`."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +51,8 @@ class FittedNetwork:
     linear_hysteresis: Float1D | None
     """(d,)"""
     bias_hysteresis: float | None
+    rows: Rows
+    """Rows of the identification"""
     harmonics: int
     """Number of last wavelets that are harmonics of the period, w cos(alpha (x - beta))"""
     lower: Float1D
@@ -51,6 +63,8 @@ class FittedNetwork:
     """Continuation below the domain: "free" if the tool leaves the object there; otherwise linear"""
     above: str = "linear"
     """The same above the domain"""
+    period: float | None = None
+    """Repeat length of a periodic force law [position]; None if the force law is not periodic"""
     play_radius: float | None = None
     """Play radius [position]; None if the direction state is not from a play operator"""
     mass: float | None = None
@@ -102,19 +116,7 @@ class FittedNetwork:
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""
-        return {
-            "alpha": self.alpha,
-            "beta": self.beta,
-            "weight": self.weight,
-            "linear": self.linear,
-            "bias": self.bias,
-            "weight_hysteresis": self.weight_hysteresis,
-            "linear_hysteresis": self.linear_hysteresis,
-            "bias_hysteresis": self.bias_hysteresis,
-            "harmonics": self.harmonics,
-            "lower": self.lower,
-            "upper": self.upper,
-        }
+        return {name: getattr(self, name) for name in PARAMETERS}
 
     def force_model(self) -> ForceModel:
         """Returns the force law over the domain; it is periodic if it has harmonics. A memory also depends on
@@ -153,7 +155,7 @@ class FittedNetwork:
             offset = force_unit.text(scale.offset)
             text = f"An offset of {offset} was subtracted from the recorded force for the fit."
             log = Log(notes=[text]) + log
-        scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+        scaled = ("weight", "linear", *HYSTERESIS)
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
             for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse", "residual")
@@ -168,41 +170,6 @@ class FittedNetwork:
             **values,
         )
 
-    @classmethod
-    def of(
-        cls, solution: Solution, readout: Float2D, lower: Float1D, reach: Float1D, **described: Any
-    ) -> FittedNetwork:
-        """Returns a solution in the units of the data; the unit box starts at `lower` and has the side
-        lengths `reach`.
-
-        `described` holds the other fields of the network.
-        """
-        d, two, basis = len(lower), len(readout) == 2, solution.basis
-        table = readout @ solution.coefficients
-        linear, weights = table[:, 1 : 1 + d] / reach, table[:, 1 + d :]
-        if basis.harmonics and not basis.hats:
-            linear = np.zeros_like(
-                linear
-            )  # harmonics repeat, so that equal ends leave a slope of rounding size
-        bias = table[:, 0] - linear @ lower
-        alpha, beta = basis.alpha / reach, lower + basis.beta * reach
-        if basis.harmonics and not two:
-            alpha, beta, weights = _one_per_order(alpha, beta, weights, basis.hats)
-        return cls(
-            alpha=alpha,
-            beta=beta,
-            weight=weights[0],
-            linear=linear[0],
-            bias=float(bias[0]),
-            weight_hysteresis=weights[1] if two else None,
-            linear_hysteresis=linear[1] if two else None,
-            bias_hysteresis=float(bias[1]) if two else None,
-            harmonics=len(alpha) - basis.hats,
-            lower=lower,
-            upper=lower + reach,
-            **described,
-        )
-
     def force(self, positions: Float2D, side: Float1D | None) -> Float1D:
         """Returns the force at positions (n, d), limited to the domain, with direction states (n,)."""
         two, model = self.weight_hysteresis is not None, self.force_model()
@@ -212,6 +179,34 @@ class FittedNetwork:
         if not two or side is None:
             return np.asarray(model.force(inside[:, 0]))
         return np.asarray(model.force(inside[:, 0], direction=np.clip(side, -1.0, 1.0)))
+
+
+def parameters_of(solution: Solution, readout: Float2D, lower: Float1D, reach: Float1D) -> dict[str, Any]:
+    """Returns a solution in the units of the data as keyword arguments of :class:`ForceModel`; the unit box
+    starts at `lower` (d,) and has the side lengths `reach` (d,)."""
+    d, two, basis = len(lower), len(readout) == 2, solution.basis
+    table = readout @ solution.coefficients
+    linear, weights = table[:, 1 : 1 + d] / reach, table[:, 1 + d :]
+    if basis.harmonics and not basis.hats:
+        # harmonics repeat, so that equal ends leave a slope of rounding size
+        linear = np.zeros_like(linear)
+    bias = table[:, 0] - linear @ lower
+    alpha, beta = basis.alpha / reach, lower + basis.beta * reach
+    if basis.harmonics and not two:
+        alpha, beta, weights = _one_per_order(alpha, beta, weights, basis.hats)
+    return {
+        "alpha": alpha,
+        "beta": beta,
+        "weight": weights[0],
+        "linear": linear[0],
+        "bias": float(bias[0]),
+        "weight_hysteresis": weights[1] if two else None,
+        "linear_hysteresis": linear[1] if two else None,
+        "bias_hysteresis": float(bias[1]) if two else None,
+        "harmonics": len(alpha) - basis.hats,
+        "lower": lower,
+        "upper": lower + reach,
+    }
 
 
 def _one_per_order(

@@ -32,7 +32,7 @@ from ..data.limits import evenly_spread
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
 from ..log import Decision, Log, PathPoint, decided, in_words, lowered
-from ..network.fitted import FittedNetwork
+from ..network.fitted import FittedNetwork, parameters_of
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
@@ -296,12 +296,11 @@ class Candidate:
     def network(self) -> FittedNetwork:
         """The network of the candidate, in the units of the recording."""
         lower, reach, moving = self.data.lower, self.data.reach, self.moving
-        return FittedNetwork.of(
-            self.solution,
-            self.problem.readout,
-            lower,
-            reach,
+        return FittedNetwork(
+            **parameters_of(self.solution, self.problem.readout, lower, reach),
             inputs=self.data.names,
+            rows=self.data,
+            period=self.data.period,
             play_radius=None if self.play_radius is None else self.play_radius * float(reach[0]),
             mass=moving and moving.mass,
             damping=moving and moving.damping,
