@@ -35,7 +35,7 @@ from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
 from ..log import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
-from ..network.separable import TINY, solve_gram
+from ..network.separable import TINY, factored, solved
 from ..options import IdentifyOptions
 from ..search.evidence import CRITERION_NAMES, LEAST_GAIN, Moving, deviance, on_fitted_rows
 
@@ -109,7 +109,7 @@ class FoldedRegression:
 
     @staticmethod
     def _solution(gram: Float2D, columns: list[int]) -> Float1D:
-        return solve_gram(gram[np.ix_(columns, columns)], gram[columns, 0])
+        return solved(factored(gram[np.ix_(columns, columns)]), gram[columns, 0])
 
 
 def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
@@ -321,7 +321,7 @@ class Dynamics:
         of_speed = (v, np.abs(v), np.ones_like(v), friction_sign(v))
         table = np.concatenate([v * np.abs(v), *(each * over_x for each in of_speed)], 1)
         product = table.T @ r
-        share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))
+        share = float(product @ solved(factored(table.T @ table), product) / max(float(r @ r), TINY))
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
 
     def _regression(self, basis: Basis, strokes: HysteresisInput | None) -> FoldedRegression | None:

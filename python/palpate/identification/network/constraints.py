@@ -22,7 +22,7 @@ from ..._core.model import derivative_bounds
 from ..._typing import Float1D, Float2D
 from ..data.compression import Compressed
 from .basis import Basis
-from .separable import SeparableProblem, Solution, factored
+from .separable import SeparableProblem, Solution
 
 IMPOSED_MARGIN = 1e-2
 """Margin by which an imposed inequality is tighter than the proved one, as a share of the RMS error [-].
@@ -261,7 +261,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     non-negative least squares solves (Lawson & Hanson 1974, chapter 23).
     """
     start = free.coefficients.ravel()
-    factor = np.tril(scipy.linalg.block_diag(*map(factored, free.grams)))
+    factor = np.tril(scipy.linalg.block_diag(*free.factors))
     reach = scipy.linalg.solve_triangular(factor, rows.T, lower=True)
     missing = limits - rows @ start
     size = np.abs(missing).max()

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, starmap
 
 import numpy as np
 import scipy
@@ -40,21 +40,22 @@ RIDGE = 1e-11
 any noise."""
 
 
-def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solves a positive semidefinite linear system by a Cholesky factorisation."""
-    solved, _ = scipy.linalg.lapack.dpotrs(factored(gram), right, lower=1)
-    return np.asarray(solved).reshape(right.shape)
+def solved(factor: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solves the linear system of a factored matrix."""
+    found, _ = scipy.linalg.lapack.dpotrs(factor, right, lower=1)
+    return np.asarray(found).reshape(right.shape)
 
 
-def half_solved(gram: Float2D, right: Float2D) -> Float2D:
-    """Returns M @ right, where M' M is the inverse of the system matrix; inner products of results are those
-    of projections."""
-    solved, _ = scipy.linalg.lapack.dtrtrs(factored(gram), right, lower=1)
-    return np.asarray(solved)
+def half_solved(factor: Float2D, right: Float2D) -> Float2D:
+    """Returns M @ right, where M' M is the inverse of the factored matrix; inner products of results are
+    those of projections."""
+    found, _ = scipy.linalg.lapack.dtrtrs(factor, right, lower=1)
+    return np.asarray(found)
 
 
 def factored(gram: Float2D) -> Float2D:
-    """Returns the factor L with gram = L L'; only the lower triangle of L is valid.
+    """Returns the Cholesky factor L of a positive semidefinite matrix, gram = L L'; only the lower triangle
+    of L is valid.
 
     The ridge is raised until the factorisation succeeds. The rounding error of the factorisation does not
     depend on the units of the columns (Demmel 1989).
@@ -159,7 +160,9 @@ class Solution:
     """Residual sum of squares plus the penalty on large weights [force^2]; refinement lowers this value"""
     designs: tuple[Float2D, ...]
     grams: tuple[Float2D, ...]
-    """Normal matrix of least squares of each block of rows, plus the penalty on large weights"""
+    """Normal matrix of least squares of each block of rows, without the penalty on large weights"""
+    factors: tuple[Float2D, ...]
+    """Factor of the normal matrix with this penalty"""
     residuals: tuple[Float1D, ...]
 
 
@@ -297,15 +300,21 @@ class SeparableProblem:
 
     def solve(self, basis: Basis) -> Solution:
         """Fits weights, slopes and biases of all channels for given wavelets."""
-        tables, designs, grams = [], [], []
-        for block in self.blocks:
-            design = block.design(block.columns(basis))
-            gram = self._gram(block, design)
-            found = solve_gram(gram, design.T @ block.target)
-            tables.append(found.reshape(block.n_channels, -1))
-            designs.append(design)
-            grams.append(gram)
-        return self._solution(basis, np.concatenate(tables), tuple(designs), tuple(grams))
+        designs = tuple(block.design(block.columns(basis)) for block in self.blocks)
+        return self._solved(basis, designs, tuple(np.asarray(each.T @ each) for each in designs))
+
+    def solve_again(self, solution: Solution) -> Solution:
+        """Returns the solution of this problem with the wavelets of a given one, whose problem differs only
+        in the penalty on large weights."""
+        return self._solved(solution.basis, solution.designs, solution.grams)
+
+    def _solved(self, basis: Basis, designs: tuple[Float2D, ...], grams: tuple[Float2D, ...]) -> Solution:
+        factors = tuple(starmap(self._factor, zip(self.blocks, grams, strict=True)))
+        tables = [
+            solved(factor, design.T @ block.target).reshape(block.n_channels, -1)
+            for block, design, factor in zip(self.blocks, designs, factors, strict=True)
+        ]
+        return self._solution(basis, np.concatenate(tables), designs, grams, factors)
 
     def with_coefficients(self, solution: Solution, coefficients: Float2D) -> Solution:
         """Returns a solution with the same wavelets, other coefficients (channels, 1 + d + N), and its
@@ -313,7 +322,9 @@ class SeparableProblem:
 
         `solution` may belong to another problem that differs only in the forces.
         """
-        return self._solution(solution.basis, coefficients, solution.designs, solution.grams)
+        return self._solution(
+            solution.basis, coefficients, solution.designs, solution.grams, solution.factors
+        )
 
     def _solution(
         self,
@@ -321,6 +332,7 @@ class SeparableProblem:
         coefficients: Float2D,
         designs: tuple[Float2D, ...],
         grams: tuple[Float2D, ...],
+        factors: tuple[Float2D, ...],
     ) -> Solution:
         residuals = tuple(
             block.target - design @ table.ravel()
@@ -329,7 +341,7 @@ class SeparableProblem:
         rss = float(sum(residual @ residual for residual in residuals))
         weights = coefficients[:, 1 + self.dimension :]
         penalty = self.prior * float(np.vdot(weights, weights))
-        return Solution(basis, coefficients, rss, rss + penalty, designs, grams, residuals)
+        return Solution(basis, coefficients, rss, rss + penalty, designs, grams, factors, residuals)
 
     def _tables(self, coefficients: Float2D) -> list[Float2D]:
         """Returns the bias, slopes and weights of the channels of each block of rows."""
@@ -349,14 +361,14 @@ class SeparableProblem:
         wavelet = np.nonzero(basis.used.T)[1]
         size = 2 * len(wavelet)
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
-        for block, design, gram, table, residual in zip(
-            self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
+        for block, design, factor, table, residual in zip(
+            self.blocks, at.designs, at.factors, self._tables(at.coefficients), at.residuals, strict=True
         ):
             jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta, basis.used)
             slope = table[:, 1 + self.dimension :].T @ block.channels.T
             jacobian.T[...] *= slope[np.tile(wavelet, 2)]
             cross = design.T @ jacobian
-            spanned = half_solved(gram, cross)
+            spanned = half_solved(factor, cross)
             matrix += jacobian.T @ jacobian - spanned.T @ spanned
             gradient += jacobian.T @ residual
         return matrix, gradient
@@ -367,10 +379,10 @@ class SeparableProblem:
         n, first, hats = len(solution.basis), 1 + self.dimension, solution.basis.hats
         alone, pairs = np.arange(hats)[:, None], np.arange(hats, n).reshape(-1, 2)
         costs = [np.zeros(len(terms)) for terms in (alone, pairs)]
-        for block, gram, table in zip(
-            self.blocks, solution.grams, self._tables(solution.coefficients), strict=True
+        for block, factor, table in zip(
+            self.blocks, solution.factors, self._tables(solution.coefficients), strict=True
         ):
-            inverse = solve_gram(gram, np.eye(len(gram)))
+            inverse = solved(factor, np.eye(len(factor)))
             for cost, terms in zip(costs, (alone, pairs), strict=True):
                 shape = len(terms), block.n_channels * terms.shape[1]
                 weights = table.T[first + terms].transpose(0, 2, 1).reshape(shape)
@@ -380,11 +392,12 @@ class SeparableProblem:
                 cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
         return np.concatenate(costs)
 
-    def _gram(self, block: Block, design: Float2D) -> Float2D:
-        gram = design.T @ design
+    def _factor(self, block: Block, gram: Float2D) -> Float2D:
+        """Returns the factor of a normal matrix plus the penalty on large weights."""
+        gram = gram.copy()
         of_weights = np.einsum("ii->i", gram).reshape(block.n_channels, -1)[:, 1 + self.dimension :]
         of_weights += self.prior
-        return np.asarray(gram)
+        return factored(gram)
 
 
 def _weight(blocks: Sequence[Block]) -> float:

@@ -415,7 +415,7 @@ class Growth:
         if not problem.every_input:
             solution = self._without_idle_inputs(problem, solution)
         problem = problem.with_prior(solution.rss)
-        return problem, problem.solve(solution.basis)
+        return problem, problem.solve_again(solution)
 
     def _criterion_of(self, problem: SeparableProblem, solution: Solution) -> float:
         return criterion_of(problem, solution, self._criterion)

@@ -195,14 +195,14 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     """Returns the decrease of the residual sum of squares (candidates,) if a candidate were added to a fitted
     network.
 
-    The result equals the gains at the start of a selection, except for the weight penalty in the Gram matrix
-    of the solution, from which it is computed.
+    The result equals the gains at the start of a selection, except for the weight penalty in the factors of
+    the solution, from which it is computed.
     """
     total = np.zeros(len(library))
-    for columns, gram, design, own, residual in zip(
-        library.columns, library.grams, current.designs, current.grams, current.residuals, strict=True
+    for columns, gram, design, factor, residual in zip(
+        library.columns, library.grams, current.designs, current.factors, current.residuals, strict=True
     ):
-        products = _products(np.vstack([half_solved(own, design.T), residual]), columns)
+        products = _products(np.vstack([half_solved(factor, design.T), residual]), columns)
         total += _falls(gram, gram - _projected_gram(products[:, :-1]), products[:, -1])
     return total
 
