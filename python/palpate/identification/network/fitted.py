@@ -19,15 +19,6 @@ from ..data.rows import Rows
 from ..log import Log
 from .separable import Solution
 
-HYSTERESIS = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
-
-PARAMETERS = (
-    *("alpha", "beta", "weight", "linear", "bias"),
-    *HYSTERESIS,
-    *("harmonics", "lower", "upper"),
-)
-"""Fields of :class:`FittedNetwork` that are keyword arguments of :class:`ForceModel`."""
-
 
 @dataclass(frozen=True)
 class FittedNetwork:
@@ -116,7 +107,9 @@ class FittedNetwork:
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""
-        return {name: getattr(self, name) for name in PARAMETERS}
+        hysteresis = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+        names = ("alpha", "beta", "weight", "linear", "bias", *hysteresis, "harmonics", "lower", "upper")
+        return {name: getattr(self, name) for name in names}
 
     def force_model(self) -> ForceModel:
         """Returns the force law over the domain; it is periodic if it has harmonics. A memory also depends on
@@ -155,7 +148,7 @@ class FittedNetwork:
             offset = force_unit.text(scale.offset)
             text = f"An offset of {offset} was subtracted from the recorded force for the fit."
             log = Log(notes=[text]) + log
-        scaled = ("weight", "linear", *HYSTERESIS)
+        scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
             for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse", "residual")
