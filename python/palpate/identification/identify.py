@@ -147,9 +147,9 @@ def identify(
     fitted, sections = in_sections(recordings)
     with one_thread():
         network = _identified(recordings, fitted, settings, object_of)
-        if not sections and network.residual is not None and len(network.residual) == sum(map(len, fitted)):
-            # Rows behind a turn with a small weight share an error: none of them is wrong alone.
-            counted = network.residual * (1.0 if network.share is None else network.share)
+        # Rows behind a turn with a small weight share an error: none of them is wrong alone.
+        counted = network.errors.weighted
+        if not sections and counted is not None and len(counted) == sum(map(len, fitted)):
             residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
             if informative.drop_wrong_readings(residuals):
                 fitted = recordings = informative.recordings
@@ -190,13 +190,13 @@ def _identified(
     rows, tried = rows_of(fitted, options, objects), []
     for period in [*(each for each in found if each is not None), options.period]:
         tried.append(fit_rows(replace(rows, period=period), replace(options, period=period)))
-        if period is not None and tried[-1].nrmse <= USABLE_NRMSE:
+        if period is not None and tried[-1].errors.nrmse <= USABLE_NRMSE:
             break
 
-    n = min(min(each.independent_rows, each.residuals) for each in tried)
+    n = min(min(each.independent_rows, each.errors.rows) for each in tried)
 
     def value(network: FittedNetwork) -> float:
-        return deviance("bic", max(network.rmse**2, TINY) * n, n, network.n_parameters)
+        return deviance("bic", max(network.errors.rmse**2, TINY) * n, n, network.n_parameters)
 
     network = tried[-1] if tried[-1].period is not None else min(reversed(tried), key=value)
     if network.period is not None and searched:
@@ -277,10 +277,10 @@ def model_of(network: FittedNetwork, units: Mapping[str, str], source: Source, v
             "model_selection": [str(decision) for decision in network.log.decisions],
             "rows": network.log.rows,
             "identification": [*network.log.notes, *network.remarks],
-            "settled_nrmse": network.settled_nrmse[0],
-            "left_out_nrmse": network.left_out_nrmse,
+            "settled_nrmse": network.errors.settled_nrmse[0],
+            "left_out_nrmse": network.errors.left_out_nrmse,
             "shift_nrmse": network.shift_nrmse,
-            "error_rows": network.residuals,
+            "error_rows": network.errors.rows,
             "verdict": verdict.record(),
         },
     )

@@ -292,12 +292,10 @@ def _identified(
     spread = float(np.sqrt(summary.variance))
     rmse = _error_on_rows(summary, network, side, settings.period)
     nrmse = rmse / spread if spread > 0 else 0.0
-    source = Source.merged(recording.source for recording in recordings)
+    source, errors = Source.merged(recording.source for recording in recordings), network.errors
     network = replace(
         network,
-        rmse=rmse,
-        nrmse=nrmse,
-        settled_nrmse=(nrmse, network.left_out_nrmse),
+        errors=replace(errors, rmse=rmse, nrmse=nrmse, settled_nrmse=(nrmse, errors.left_out_nrmse)),
         log=replace(log, decisions=[]) + network.log + Log(decisions=log.decisions),
     )
     if settings.period is None:

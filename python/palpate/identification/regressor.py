@@ -22,7 +22,7 @@ from .data.compression import held_out_rows
 from .data.limits import ForceScale, distinct_rows, evenly_spread
 from .data.rows import LARGEST_MAGNITUDE, Rows
 from .log import Log
-from .network.fitted import FittedNetwork
+from .network.fitted import Errors, FittedNetwork
 from .options import IdentifyOptions
 from .search.evidence import ON_HELD_OUT_ROWS, RowError
 from .threads import one_thread
@@ -245,7 +245,9 @@ def fit_regression(
         error = RowError(y[some] - best.force_at(some), y[some], weight[some])
     margin = _margin(rows.box) * (upper - lower)
     log = Log(selection.log.path)
-    network = replace(best.network, rmse=error.rmse, log=log, lower=lower - margin, upper=upper + margin)
+    network = replace(
+        best.network, errors=Errors(error.rmse), log=log, lower=lower - margin, upper=upper + margin
+    )
     return columns, network.unscaled(scale)
 
 
@@ -313,7 +315,8 @@ def _model_of(
             digest.update(np.ascontiguousarray(array).tobytes())
     mean = np.average(y, weights=weight)
     spread = float(np.sqrt(np.average((y - mean) ** 2, weights=weight)))
-    found = replace(found, nrmse=found.rmse / spread if spread > 0 else 0.0)
+    rmse = found.errors.rmse
+    found = replace(found, errors=Errors(rmse, rmse / spread if spread > 0 else 0.0))
     return Model(
         kind="general",
         inputs=inputs,

@@ -20,7 +20,7 @@ from ..data.rows import Rows, period_notes
 from ..data.strokes import weights_of_shared_errors
 from ..log import Decision, Log, causes_of_crossing, latest, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
-from ..network.fitted import FittedNetwork
+from ..network.fitted import Errors, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
 from .causes import MOST_JND, PLACE_ERRORS, Judged, cause_of, means_at, places_of
@@ -68,7 +68,7 @@ def verdict_of(
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows, and `attracts`
     is True if the object is stated to attract the tool."""
-    fitted, left_out = network.settled_nrmse
+    fitted, left_out = network.errors.settled_nrmse
     moving = network.damping is not None or network.memory is not None or "velocity" in network.inputs
     explained = moving and max(fitted, left_out) <= UNFIT_NRMSE
     findings = [*findings_of(recordings, side, attracts, explained), *network.log.findings]
@@ -156,9 +156,9 @@ def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
 
 def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
     """Returns an identified network that has a residual on all rows."""
-    assert network.residual is not None
-    inputs = _inputs(network)
-    return Judged(rows, network.residual, rows.fitted.astype(float), rows.direction, inputs)
+    residual = network.errors.residual
+    assert residual is not None
+    return Judged(rows, residual, rows.fitted.astype(float), rows.direction, _inputs(network))
 
 
 def place_findings(best: Judged) -> list[Finding]:
@@ -390,7 +390,6 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings."""
     best, log, options = selection.best, selection.log, selection.options
     data, error, network = best.data, best.error, best.network
-    counted = error.weight
     notes, findings = list(data.log.notes), list(data.log.findings)
     decisions, replaced = latest([*log.decisions, *data.log.decisions])
     if data.period is not None:
@@ -414,7 +413,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or drift_findings(judged)
         or place_findings(judged)
     )
-    share, left_out = np.where(data.fitted, best.share, 1.0), selection.once(left_out_residual)
+    left_out = selection.once(left_out_residual)
     if f"{settled.nrmse:.2g}" != f"{error.nrmse:.2g}":
         notes.append(
             "Rows behind turns share an error, because friction reverses there, and count less in the fit: "
@@ -427,19 +426,20 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         above=above,
         lower=network.lower + data.reach * first,
         upper=network.upper - data.reach * last,
-        rmse=error.rmse,
-        nrmse=error.nrmse,
-        rmse_of_all=replace(error, weight=share).rmse,
-        settled_rmse=best.settled.rmse,
-        settled_nrmse=(settled.nrmse, replace(settled, residual=left_out).nrmse),
-        residual=best.residual,
-        share=share,
-        left_out_nrmse=replace(error, residual=left_out).nrmse,
-        shift_nrmse=shift_nrmse,
-        residuals=int(np.count_nonzero(counted)),
-        residual_correlation=neighbour_correlation(
-            best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]
+        errors=Errors(
+            rmse=error.rmse,
+            nrmse=error.nrmse,
+            left_out_nrmse=replace(error, residual=left_out).nrmse,
+            settled_nrmse=(settled.nrmse, replace(settled, residual=left_out).nrmse),
+            settled_rmse=best.settled.rmse,
+            rows=int(np.count_nonzero(error.weight)),
+            correlation=neighbour_correlation(
+                best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]
+            ),
+            residual=best.residual,
+            share=np.where(data.fitted, best.share, 1.0),
         ),
+        shift_nrmse=shift_nrmse,
         band=band,
         log=Log(
             log.path,

@@ -27,7 +27,7 @@ from ...verdict import Finding, usable
 from ..data.rows import Rows, rows_of
 from ..fit import fit_rows
 from ..log import Decision, Log, decided, lowered, squared_error_change
-from ..network.fitted import FittedNetwork
+from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
@@ -322,11 +322,12 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
         return ""
     if "velocity" in found.inputs:
         return _unsupported(options)
-    spread = found.rmse / found.nrmse if found.nrmse else math.inf
-    if (nrmse := found.rmse_of_all / spread) < LEAST_NRMSE:
+    errors = found.errors
+    spread = errors.rmse / errors.nrmse if errors.nrmse else math.inf
+    if (nrmse := _rms_of_all(errors) / spread) < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
-    every_second = 2 * found.residuals >= len(found.rows.force)
-    upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
+    every_second = 2 * errors.rows >= len(found.rows.force)
+    upper = errors.correlation + 2.0 / np.sqrt(max(errors.rows, 1))
     if every_second and upper < LEAST_CORRELATION:
         return (
             "the error of the model without memory is noise: residuals of neighbouring rows have a "
@@ -356,35 +357,41 @@ def better_with_memory(
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
         return replace(found, log=found.log + Log(decisions=[decision])) if reason else found
+    tried = _with_memory(found, recordings, options)
+    if isinstance(tried, str):
+        return replace(found, log=found.log + Log(decisions=[decided("memory", False, tried)]))
+    return tried
+
+
+def _with_memory(
+    found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions
+) -> FittedNetwork | str:
+    """Returns the model with memory, or the reason why it is not accepted."""
     recorded = Recorded.of(recordings, found, options)
     choice = grown(recorded, options)
     if choice.shape is None:
-        return _refused(found, "no branch lowers the criterion")
+        return "no branch lowers the criterion"
     compared = _Compared.of(found, recorded)
-    moved = _moved_zero(found, recordings, options)
+    moved = _moved_zero(found, recordings)
     before = max(compared.rmse**2 - moved, TINY) / recorded.spread**2
     in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
-        return _refused(found, _gain_text(in_sample, 0.0, moved))
+        return _gain_text(in_sample, 0.0, moved)
     at_rest = replace(recorded.at_rest(choice, options), below=recorded.below, above=recorded.above)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
     refined = shape.without_idle(fit.solved(shape)[1])
     if refined is None:
-        return _refused(found, "no branch lowers the criterion")
+        return "no branch lowers the criterion"
     if len(refined.log_yield) == 1:
-        return _refused(found, "one branch that slips is a play operator, as hysteresis has")
+        return "one branch that slips is a play operator, as hysteresis has"
     if recorded.ranges.log_tau is not None and not len(refined.log_yield):
         shortest, longest = np.exp(recorded.ranges.log_tau)
         if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
-            return _refused(
-                found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve"
-            )
+            return f"the branches relax within {shortest:.2g} s, which the rows do not resolve"
         if np.exp(refined.log_tau.min()) > longest / RESOLVED_RATIO:
-            return _refused(
-                found, f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
-            )
+            return f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
     coefficients, stiffness = fit.solved(refined)
     network = replace(
         at_rest,
@@ -409,9 +416,8 @@ def better_with_memory(
     if where_sure**2 > max((1.0 + LEAST_GAIN) * compared.rmse_where_sure**2, allowed**2):
         # The pauses of friction that creeps would accept a model that is wrong while the tool moves.
         change = recordings[0].file_unit("force").interval(compared.rmse_where_sure, where_sure)
-        return _refused(
-            found,
-            f"if the force creeps between press and release in pauses, it raises the RMS error from {change}",
+        return (
+            f"if the force creeps between press and release in pauses, it raises the RMS error from {change}"
         )
     held_out = fit.held_out_errors(refined, compared.balance)
     left_out_nrmse = float(np.sqrt(held_out.mean()))
@@ -428,8 +434,7 @@ def better_with_memory(
         text = f"{lowered('BIC', falls)}, must lower it by at least {options.search.evidence:.4g}"
         accepted = falls >= options.search.evidence
     if not accepted:
-        return _refused(found, text)
-    decision = decided("memory", True, text)
+        return text
     nrmse = of_all / recorded.judged_spread
     left_out_nrmse *= recorded.spread / recorded.judged_spread
     network = replace(
@@ -437,18 +442,12 @@ def better_with_memory(
         rows=found.rows,
         model_class="memory",
         n_parameters=n_parameters,
-        rmse=of_all,
-        nrmse=nrmse,
-        rmse_of_all=of_all,
-        settled_rmse=of_all,
-        settled_nrmse=(nrmse, left_out_nrmse),
-        left_out_nrmse=left_out_nrmse,
-        residual=of_rows,
-        share=None,
-        residuals=len(of_rows),
+        errors=Errors(
+            of_all, nrmse, left_out_nrmse, (nrmse, left_out_nrmse), of_all, len(of_rows), residual=of_rows
+        ),
         log=Log(
             found.log.path + network.log.path,
-            [*found.log.decisions, decision],
+            [*found.log.decisions, decided("memory", True, text)],
             found.log.rows,
             [*found.log.notes, *_branches(recorded, refined)],
             list(_undetermined(found, recordings)),
@@ -461,12 +460,13 @@ def better_with_memory(
     return replace(network, log=network.log + Log(findings=findings))
 
 
-def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> float:
+def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
     """Returns the mean square of the force [force^2] that a zero or an object that changes explains of the
     residual without memory, as branches can: a memory must explain more. 0 if nothing changes."""
-    if found.residual is None or len(found.residual) != sum(map(len, recordings)):
+    residual = found.errors.residual
+    if residual is None or len(residual) != sum(map(len, recordings)):
         return 0.0
-    cause = cause_of(judged_network(found, rows_of(recordings, options)))
+    cause = cause_of(judged_network(found, found.rows))
     return cause.explained if cause is not None and cause.by in (FIRST, LATER) else 0.0
 
 
@@ -510,10 +510,6 @@ def _forgotten(recorded: Recorded, of_all: float, in_contact: float) -> Finding:
     )
 
 
-def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
-    return replace(found, log=found.log + Log(decisions=[decided("memory", False, reason)]))
-
-
 def _gain_text(gain: float, error: float, moved: float) -> str:
     change = squared_error_change(gain, error, "held-out sections")
     compared = " compared with a zero or an object that changes" if moved else ""
@@ -538,7 +534,7 @@ class _Compared:
 
     @classmethod
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
-        parts = recorded.recordings
+        parts, errors = recorded.recordings, found.errors
         ends = np.cumsum([len(part) for part in parts])
         force, position = (
             recorded.fitted([getattr(part, name) for part in parts]) for name in ("force", "position")
@@ -549,13 +545,13 @@ class _Compared:
             speed, known = (recorded.fitted(list(each)) for each in zip(*velocities(parts), strict=True))
             share, outside = known.astype(float), np.zeros(len(force))
             residual = force - found.force(np.column_stack([position, speed]), None)
-        elif found.residual is None or found.share is None or len(found.residual) != ends[-1]:
+        elif errors.residual is None or errors.share is None or len(errors.residual) != ends[-1]:
             # some rows have no residual, such as those at gaps of time
             whole = np.array(1.0)
-            return cls(balance, whole, whole, found.rmse_of_all, found.settled_rmse)
+            return cls(balance, whole, whole, _rms_of_all(errors), errors.settled_rmse)
         else:
             residual, share = (
-                recorded.fitted(np.split(each, ends[:-1])) for each in (found.residual, found.share)
+                recorded.fitted(np.split(each, ends[:-1])) for each in (errors.residual, errors.share)
             )
             strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
             outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))
@@ -564,6 +560,12 @@ class _Compared:
         return cls(
             balance, share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure)
         )
+
+
+def _rms_of_all(errors: Errors) -> float:
+    """Returns the RMS error on every row, also on those that are not fitted [force]."""
+    assert errors.residual is not None
+    return _rms(errors.residual, np.array(1.0) if errors.share is None else errors.share)
 
 
 def _rms(residual: Float1D, weight: NDArray[Any]) -> float:

@@ -21,6 +21,41 @@ from .separable import Solution
 
 
 @dataclass(frozen=True)
+class Errors:
+    """Errors of an identified force law on the rows of an identification."""
+
+    rmse: float = 0.0
+    """RMS error on the fitted samples [force]"""
+    nrmse: float = 0.0
+    """RMS error divided by the standard deviation of the force [-]"""
+    left_out_nrmse: float = 0.0
+    """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
+    settled_nrmse: tuple[float, float] = (0.0, 0.0)
+    """NRMSE on fitted and on left out rows, with their weights in the fit [-]"""
+    settled_rmse: float = 0.0
+    """RMS error on the fitted samples, with their weights in the fit [force]"""
+    rows: int = 0
+    """Number of fitted rows"""
+    correlation: float = 0.0
+    """Correlation of the residuals of neighbouring rows in recorded order [-]"""
+    residual: Float1D | None = None
+    """(n,) force of each row minus that of the network [force]"""
+    share: Float1D | None = None
+    """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
+
+    @property
+    def weighted(self) -> Float1D | None:
+        """(n,) residual of each row times its weight [force]; None without residuals."""
+        return self.residual if self.residual is None or self.share is None else self.share * self.residual
+
+    def unscaled(self, factor: float) -> Errors:
+        """Returns the errors of forces that are divided by a factor."""
+        residual = None if self.residual is None else self.residual / factor
+        rmse, settled_rmse = self.rmse / factor, self.settled_rmse / factor
+        return replace(self, rmse=rmse, settled_rmse=settled_rmse, residual=residual)
+
+
+@dataclass(frozen=True)
 class FittedNetwork:
     """Identified force law f = g(x) + s h(x), with mean force g, direction state s, hysteresis h, and the
     tested networks."""
@@ -71,30 +106,11 @@ class FittedNetwork:
     recordings do not repeat better, or "data" if no wavelet could be added"""
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
-    rmse: float = 0.0
-    """RMS error on the samples of the identification [force]"""
-    nrmse: float = 0.0
-    """RMS error divided by the standard deviation of the force [-]"""
-    rmse_of_all: float = 0.0
-    """RMS error on every row of the recordings, also on those that are not fitted, with the weights `share`
-    [force]"""
-    settled_rmse: float = 0.0
-    """RMS error on the samples of the identification, with their weights in the fit [force]"""
-    settled_nrmse: tuple[float, float] = (0.0, 0.0)
-    """NRMSE on the rows of the fit, and on rows that are left out of it, with their weights in the fit [-]"""
-    residual: Float1D | None = None
-    """(n,) force of each row minus that of the network [force]"""
-    share: Float1D | None = None
-    """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
-    left_out_nrmse: float = 0.0
-    """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
+    errors: Errors = Errors()
+    """Errors on the rows"""
     shift_nrmse: float = 0.0
     """RMS change of the force by a shift of press against release, divided by the standard deviation of the
     force [-]; 0 if the rows show no shift"""
-    residuals: int = 0
-    """Number of rows with a residual"""
-    residual_correlation: float = 0.0
-    """Correlation of the residuals of neighbouring rows in recorded order [-]"""
     independent_rows: float = np.inf
     """Number of independent rows; below the number of rows if rows are repeated or their noise is
     correlated"""
@@ -134,7 +150,7 @@ class FittedNetwork:
         return Fit(
             model_class=self.model_class,
             stop_reason=self.stop_reason,
-            nrmse=self.nrmse,
+            nrmse=self.errors.nrmse,
             n_wavelets=len(self.weight),
             n_parameters=self.n_parameters,
             path=path,
@@ -151,7 +167,7 @@ class FittedNetwork:
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
-            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all", "settled_rmse", "residual")
+            for name in (*scaled, "mass", "damping")
         }
         return replace(
             self,
@@ -159,6 +175,7 @@ class FittedNetwork:
             above="linear" if scale.offset else self.above,
             bias=self.bias / factor + scale.offset,
             log=log,
+            errors=self.errors.unscaled(factor),
             band=None if self.band is None else self.band.scaled(1.0 / factor),
             **values,
         )

@@ -53,7 +53,7 @@ def test_noise_about_a_level_is_a_constant() -> None:
 
 def test_a_force_that_never_changes_is_a_constant() -> None:
     network = fit_environment(np.linspace(0.0, 1.0, 50)[:, None], np.full(50, 2.5))
-    assert (network.model_class, network.bias, network.nrmse) == ("constant", 2.5, 0.0)
+    assert (network.model_class, network.bias, network.errors.nrmse) == ("constant", 2.5, 0.0)
 
 
 def test_exactly_linear_data_are_linear() -> None:
@@ -71,7 +71,7 @@ def test_growth_on_data_without_noise_stops_at_sensor_resolution(encoder_step: f
     network = fit_environment(x[:, None], force, starts=[0])
     assert network.model_class == "position"
     assert len(network.weight) <= 12
-    assert network.rmse <= 2.0**-16 * np.ptp(force)
+    assert network.errors.rmse <= 2.0**-16 * np.ptp(force)
 
 
 def test_friction_between_strokes_is_accepted_as_hysteresis_without_wavelets() -> None:
@@ -104,7 +104,7 @@ def test_rows_without_direction_are_dropped_and_counted() -> None:
     y[side == 0] = 50.0
     network = fit_environment(x[:, None], y, side)
     assert network.model_class == "hysteresis"
-    assert network.rmse < 0.03
+    assert network.errors.rmse < 0.03
     assert "30 rows without a direction are not fitted." in network.log.rows
 
 
@@ -166,7 +166,7 @@ def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> No
     assert network.model_class == "hysteresis"
     assert network.play_radius == pytest.approx(0.01, rel=0.01)
     assert network.n_parameters == 4 * len(network.weight) + 5
-    assert network.rmse == pytest.approx(0.01, rel=0.1)
+    assert network.errors.rmse == pytest.approx(0.01, rel=0.1)
 
 
 def test_parameters_are_counted_as_every_fitted_number() -> None:
@@ -189,7 +189,7 @@ def test_path_contains_every_considered_network() -> None:
     sizes = [point.n_wavelets for point in network.log.path if point.model_class == "position"]
     assert sizes[:-1] == list(range(len(sizes) - 1))
     assert sizes[-1] == len(network.weight)
-    assert network.log.path[-1].rmse == pytest.approx(network.rmse)
+    assert network.log.path[-1].rmse == pytest.approx(network.errors.rmse)
     assert network.stop_reason == "bic"
 
 
@@ -212,7 +212,7 @@ def test_the_result_does_not_depend_on_units() -> None:
     other = fit_environment(1e-6 * x[:, None] + 3.0, 1e3 * y)
     assert len(one.weight) == len(other.weight)
     np.testing.assert_allclose(other.alpha, 1e6 * one.alpha, rtol=1e-2)
-    assert other.nrmse == pytest.approx(one.nrmse, rel=1e-3)
+    assert other.errors.nrmse == pytest.approx(one.errors.nrmse, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -339,7 +339,7 @@ def sign_findings(network: FittedNetwork) -> list[str]:
 def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> None:
     positions, force, side = loop(0.5 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 60)))
     network = fit_environment(positions, force, side)
-    assert network.nrmse > 0.3
+    assert network.errors.nrmse > 0.3
     (sentence,) = sign_findings(network)
     assert "--no-hysteresis-nonnegative" in sentence
     assert "--negate" not in sentence

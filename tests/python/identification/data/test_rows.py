@@ -72,7 +72,7 @@ def test_six_inputs_and_many_rows_need_no_grid() -> None:
         None,
         IdentifyOptions(max_wavelets=4, search=SearchOptions(max_positions=64, max_candidates=1024)),
     )
-    assert network.nrmse < 0.5
+    assert network.errors.nrmse < 0.5
     assert any("rows are used, evenly spread" in note for note in network.log.rows)
 
 

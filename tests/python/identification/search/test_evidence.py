@@ -65,7 +65,7 @@ def test_held_out_rows_outside_fitted_range_do_not_refuse_a_network() -> None:
     force += np.random.default_rng(0).normal(0.0, 0.002, n)
     network = fit_environment(x[:, None], force, None, IdentifyOptions(inputs="position"), starts=[0])
     assert network.model_class == "position"
-    assert network.nrmse < 0.02
+    assert network.errors.nrmse < 0.02
 
 
 def test_decisions_report_the_criterion_of_each_model_class() -> None:
