@@ -8,7 +8,6 @@ constraints imposed. It is accepted only if the criterion decreases by at least 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -62,7 +61,7 @@ class ClassSelection:
         Model classes in the order in which they are tried, the simplest first.
     """
 
-    def __init__(self, data: Rows, options: IdentifyOptions, classes: Sequence[type[ModelClass]]) -> None:
+    def __init__(self, data: Rows, options: IdentifyOptions, classes: Sequence[ModelClass]) -> None:
         self.data, self.options, self.classes = data, options, classes
         self.log = Log()
         self.samples = Samples(data, options)
@@ -79,11 +78,10 @@ class ClassSelection:
         """Candidate of the most complex model class that has been accepted"""
         self.try_classes(classes)
 
-    def try_classes(self, classes: Sequence[type[ModelClass]]) -> None:
+    def try_classes(self, classes: Sequence[ModelClass]) -> None:
         """Tries model classes in order; each is compared with the best candidate of the classes before it."""
         for model_class in classes:
-            if model_class.possible(self):
-                self.best = model_class(self).better(self.best)
+            self.best = model_class(self, self.best)
 
     def once(self, compute: Callable[[ClassSelection], Value]) -> Value:
         """Returns the value of a function of this selection, computed once for each best candidate."""
@@ -233,55 +231,30 @@ class ClassSelection:
         return float((place - lower) / reach), fixed
 
 
-class ModelClass(ABC):
-    """Kind of force law; its candidate is compared with the best candidate of the simpler model classes."""
-
-    def __init__(self, selection: ClassSelection) -> None:
-        self._selection = selection
-
-    @classmethod
-    def possible(cls, selection: ClassSelection) -> bool:
-        """True if the options and the rows allow this model class."""
-        return True
-
-    @abstractmethod
-    def better(self, below: Candidate) -> Candidate:
-        """Returns the candidate of this model class if it is accepted, else the simpler candidate."""
+ModelClass = Callable[[ClassSelection, Candidate], Candidate]
+"""Fits a candidate of a kind of force law and returns it if it is accepted. Otherwise, or if the rows or
+options do not allow it, returns the given candidate, the best one of the simpler model classes."""
 
 
-class Linear(ModelClass):
-    """Model class linear: a straight line over every input, if there are enough rows."""
-
-    def better(self, below: Candidate) -> Candidate:
-        selection = self._selection
-        if below.problem.n_parameters(Basis.empty(below.problem.dimension)) >= below.problem.samples:
-            return below
-        return selection.judge.better(
-            below, selection.recorded(selection.constrained(straight_line(selection)))
-        )
+def linear(selection: ClassSelection, below: Candidate) -> Candidate:
+    """Fits the model class linear, a straight line over every input, if there are enough rows."""
+    if below.problem.n_parameters(Basis.empty(below.problem.dimension)) >= below.problem.samples:
+        return below
+    line = selection.recorded(selection.constrained(straight_line(selection)))
+    return selection.judge.better(below, line)
 
 
-class Network(ModelClass):
-    """Model class of a wavelet network over the inputs; the inputs decide its name: position, velocity,
+def network(selection: ClassSelection, below: Candidate) -> Candidate:
+    """Fits a wavelet network over the inputs; they decide the name of its model class: position, velocity,
     network."""
-
-    def __init__(self, selection: ClassSelection) -> None:
-        super().__init__(selection)
-        self.name = NETWORK_CLASSES.get(selection.data.names, "network")
-
-    @classmethod
-    def possible(cls, selection: ClassSelection) -> bool:
-        """True if the options allow wavelets."""
-        return selection.options.max_wavelets > 0
-
-    def better(self, below: Candidate) -> Candidate:
-        selection, most = self._selection, self._selection.options.max_wavelets
-        if below.problem.n_parameters(Basis.empty(below.problem.dimension), more=1) >= below.problem.samples:
-            return below
-        problem = selection.problem
-        grown = selection.grown(problem, Basis.empty(problem.dimension), self.name, most)
-        found = selection.candidate(self.name, grown.problem, grown.solution, grown.stop_reason)
-        return selection.judge.better(below, selection.constrained(found))
+    problem, most = selection.problem, selection.options.max_wavelets
+    start = Basis.empty(problem.dimension)
+    if most == 0 or problem.n_parameters(start, more=1) >= problem.samples:
+        return below
+    name = NETWORK_CLASSES.get(selection.data.names, "network")
+    grown = selection.grown(problem, start, name, most)
+    found = selection.candidate(name, grown.problem, grown.solution, grown.stop_reason)
+    return selection.judge.better(below, selection.constrained(found))
 
 
 def constant(selection: ClassSelection) -> Candidate:

@@ -28,7 +28,7 @@ from ..network.basis import Basis
 from ..network.constraints import impose
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Samples, on_fitted_rows
-from .class_selection import ClassSelection, ModelClass, straight_line
+from .class_selection import ClassSelection, straight_line
 from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
@@ -57,33 +57,35 @@ REWEIGHTINGS = 5
 """Number of fits of given wavelets, each with the weights that follow from the fit before."""
 
 
-class Hysteresis(ModelClass):
+def hysteresis(selection: ClassSelection, below: Candidate) -> Candidate:
+    """Fits the model class hysteresis, if the options allow it and the rows have directions or the starts of
+    motions.
+
+    Raises
+    ------
+    InputError
+        The inputs name hysteresis, and the rows have neither.
+    """
+    inputs, data = selection.options.inputs, selection.data
+    has_direction = data.side is not None or (data.starts is not None and len(data.names) == 1)
+    if not has_direction and "hysteresis" in inputs:
+        raise InputError(
+            "inputs names hysteresis: the recording needs time, or both directions in a direction "
+            "column; name that column, or remove hysteresis from inputs"
+        )
+    if not has_direction or not (inputs == "auto" or "hysteresis" in inputs):
+        return below
+    return Hysteresis(selection).better(below)
+
+
+class Hysteresis:
     """Network with hysteresis, f = g + s h; it is grown if hysteresis lowers the criterion or the options
     name it."""
 
     name = "hysteresis"
 
     def __init__(self, selection: ClassSelection) -> None:
-        super().__init__(selection)
-        self._named = selection.options.inputs != "auto"
-
-    @classmethod
-    def possible(cls, selection: ClassSelection) -> bool:
-        """True if the options allow hysteresis and the rows have directions or the starts of motions.
-
-        Raises
-        ------
-        InputError
-            The inputs name hysteresis, and the rows have neither.
-        """
-        inputs, data = selection.options.inputs, selection.data
-        has_direction = data.side is not None or (data.starts is not None and len(data.names) == 1)
-        if not has_direction and "hysteresis" in inputs:
-            raise InputError(
-                "inputs names hysteresis: the recording needs time, or both directions in a direction "
-                "column; name that column, or remove hysteresis from inputs"
-            )
-        return has_direction and (inputs == "auto" or "hysteresis" in inputs)
+        self._selection, self._named = selection, selection.options.inputs != "auto"
 
     def better(self, below: Candidate) -> Candidate:
         selection, data = self._selection, self._selection.data

@@ -25,12 +25,11 @@ from .class_selection import (
     REGROWTH_ERROR_RATIO,
     VELOCITY_INPUTS,
     ClassSelection,
-    Linear,
-    ModelClass,
-    Network,
+    linear,
+    network,
 )
 from .findings import USABLE_NRMSE, judged_candidate
-from .hysteresis import Hysteresis
+from .hysteresis import hysteresis
 from .repeatability import no_finer_than_repeats
 from .shift import shift_of
 
@@ -78,126 +77,107 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
     return min(found, key=lambda each: each[0])[1]
 
 
-class MassAndDamping(ModelClass):
-    """Model class dynamics: fits mass and damping, then selects the model again on the force without their
-    forces."""
+def mass_and_damping(selection: ClassSelection, below: Candidate) -> Candidate:
+    """Fits mass and damping, then selects the model again on the force without their forces.
 
-    @classmethod
-    def possible(cls, selection: ClassSelection) -> bool:
-        """True if `ClassSelection.motion` is known; it may be too short or too noisy for a fit."""
-        return selection.motion is not None
-
-    def better(self, below: Candidate) -> Candidate:
-        """Returns the candidate with mass and damping if they are accepted, else the simpler candidate.
-
-        Wavelets that fit inertia hide a part of it. Mass and damping are fitted again with the wavelets of
-        the last selection until their force no longer changes the error.
-        """
-        selection, motion, data = self._selection, self._selection.motion, self._selection.data
-        assert motion is not None
-        found, log, change = below, Log(), math.inf
-        while True:
-            values, decisions, findings = motion.accepted(found.solution.basis, found.strokes)
-            moving = motion.moving(values)
-            if not values or min(values.values()) <= 0.0 or not moving.known.any():
-                found = below  # a passive object has no negative mass or damping
-                break
-            step = moving.force - (0.0 if found.moving is None else found.moving.force)
-            last, change = change, float(np.sqrt(np.mean(step[moving.known > 0.0] ** 2)))
-            settled = math.hypot(found.rmse, change) <= REGROWTH_ERROR_RATIO * found.rmse
-            if found is not below and (settled or change >= last):
-                break
-            weight = moving.known if data.weight is None else moving.known * data.weight
-            again = selection.repeated(replace(data, force=data.force - moving.force, weight=weight))
-            log = again.log
-            found = replace(
-                again.best,
-                model_class="velocity" if moving.mass is None else "mass and damping",
-                data=data,
-                n_parameters=again.best.n_parameters + len(values),
-                moving=moving,
-            )
-        selection.log.decisions.extend(decisions)
-        selection.log.findings.extend(findings if not selection.log.findings else [])
-        if found is below:
-            return below
-        note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
-        selection.log.follow(replace(log, findings=findings or log.findings), [note])
-        return selection.recorded(found)
-
-
-class Velocity(ModelClass):
-    """Model class velocity: a network over position and velocity, for damping or friction that depends on
-    both."""
-
-    @classmethod
-    def possible(cls, selection: ClassSelection) -> bool:
-        """True if the recorded motion allows velocity as an input, and the model is not periodic."""
-        motion = selection.motion
-        return motion is not None and motion.accelerates and selection.data.period is None
-
-    def better(self, below: Candidate) -> Candidate:
-        """Returns the network over position and velocity if the squared error decreases enough, else the
-        simpler candidate."""
-        data, log, motion, moving = (
-            self._selection.data,
-            self._selection.log,
-            self._selection.motion,
-            below.moving,
+    Wavelets that fit inertia hide a part of it. Mass and damping are fitted again with the wavelets of
+    the last selection until their force no longer changes the error.
+    """
+    motion, data = selection.motion, selection.data
+    if motion is None:
+        return below
+    found, log, change = below, Log(), math.inf
+    while True:
+        values, decisions, findings = motion.accepted(found.solution.basis, found.strokes)
+        moving = motion.moving(values)
+        if not values or min(values.values()) <= 0.0 or not moving.known.any():
+            found = below  # a passive object has no negative mass or damping
+            break
+        step = moving.force - (0.0 if found.moving is None else found.moving.force)
+        last, change = change, float(np.sqrt(np.mean(step[moving.known > 0.0] ** 2)))
+        settled = math.hypot(found.rmse, change) <= REGROWTH_ERROR_RATIO * found.rmse
+        if found is not below and (settled or change >= last):
+            break
+        weight = moving.known if data.weight is None else moving.known * data.weight
+        again = selection.repeated(replace(data, force=data.force - moving.force, weight=weight))
+        log = again.log
+        found = replace(
+            again.best,
+            model_class="velocity" if moving.mass is None else "mass and damping",
+            data=data,
+            n_parameters=again.best.n_parameters + len(values),
+            moving=moving,
         )
-        assert motion is not None
-        damped = moving is not None and moving.mass is None
-        residual = below.static_force - below.force_at()
-        cause = cause_of(judged_candidate(below))
-        if cause is None or not (cause.by == FASTER and cause.perceptible and cause.share >= LEAST_GAIN):
-            if not (damped or below.settled.nrmse > USABLE_NRMSE):
-                return below
-            if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:
-                return below
-        velocity, rows = motion.velocity()
-        if not rows.any():
-            return below
-        over_both = Rows(
-            VELOCITY_INPUTS,
-            np.column_stack([data.positions, velocity])[rows],
-            data.force[rows],
-            starts=(0,),
-            weight=None if data.weight is None else data.weight[rows],
-            role=data.roles[rows],
-            log=data.log,
-            repeats=None if data.repeats is None else data.repeats.only(rows),
-            position_unit=data.position_unit,
-            force_unit=data.force_unit,
-        )
-        both = select(over_both, self._selection.options)
-        squares = below.fit_weight * residual**2
-        before, unknown = float(np.sum(squares)), float(np.sum(squares[~rows]))  # the latter have no velocity
-        after = float(below.fit_weight[rows] @ both.best.residual**2)
-        constant = moving is not None and moving.damping is not None
-        compared = "constant damping" if constant else in_words(below.model_class)
-        if shift := shift_of(self._selection):
-            # A network that is grown without the shift explains as much as the velocity of a late force.
-            moved = shift.without
-            grown = self._selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
-            unshifted = (grown.problem.rmse(grown.solution) / shift.before) ** 2
-            before, unknown = before * unshifted, unknown * unshifted
-            compared = f"{compared} with shifted strokes"
-        share = 1.0 - (after + unknown) / before if before > 0.0 else 0.0
-        change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
-        bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
-        decision = decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}")
-        if share < LEAST_GAIN:
-            log.path += both.log.path
-            log.decisions.append(decision)
-            return below
-        over_both_inputs = [f"Over position and velocity: {each}." for each in both.log.decisions]
-        findings = [*log.findings, *both.log.findings]
-        log.follow(replace(both.log, decisions=[decision], findings=findings), over_both_inputs)
-        return both.best
+    selection.log.decisions.extend(decisions)
+    selection.log.findings.extend(findings if not selection.log.findings else [])
+    if found is below:
+        return below
+    note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
+    selection.log.follow(replace(log, findings=findings or log.findings), [note])
+    return selection.recorded(found)
 
 
-STATIC_CLASSES = (Linear, Network, Hysteresis)
+def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
+    """Fits the model class velocity, a network over position and velocity, for damping or friction that
+    depends on both.
+
+    It must decrease the squared error enough; a periodic model has none.
+    """
+    data, log, motion, moving = selection.data, selection.log, selection.motion, below.moving
+    if motion is None or not motion.accelerates or data.period is not None:
+        return below
+    damped = moving is not None and moving.mass is None
+    residual = below.static_force - below.force_at()
+    cause = cause_of(judged_candidate(below))
+    if cause is None or not (cause.by == FASTER and cause.perceptible and cause.share >= LEAST_GAIN):
+        if not (damped or below.settled.nrmse > USABLE_NRMSE):
+            return below
+        if motion.share_of_velocity(residual, below.solution.basis) < LEAST_GAIN:
+            return below
+    speed, rows = motion.velocity()
+    if not rows.any():
+        return below
+    over_both = Rows(
+        VELOCITY_INPUTS,
+        np.column_stack([data.positions, speed])[rows],
+        data.force[rows],
+        starts=(0,),
+        weight=None if data.weight is None else data.weight[rows],
+        role=data.roles[rows],
+        log=data.log,
+        repeats=None if data.repeats is None else data.repeats.only(rows),
+        position_unit=data.position_unit,
+        force_unit=data.force_unit,
+    )
+    both = select(over_both, selection.options)
+    squares = below.fit_weight * residual**2
+    before, unknown = float(np.sum(squares)), float(np.sum(squares[~rows]))  # the latter have no velocity
+    after = float(below.fit_weight[rows] @ both.best.residual**2)
+    constant = moving is not None and moving.damping is not None
+    compared = "constant damping" if constant else in_words(below.model_class)
+    if shift := shift_of(selection):
+        # A network that is grown without the shift explains as much as the velocity of a late force.
+        moved = shift.without
+        grown = selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
+        unshifted = (grown.problem.rmse(grown.solution) / shift.before) ** 2
+        before, unknown = before * unshifted, unknown * unshifted
+        compared = f"{compared} with shifted strokes"
+    share = 1.0 - (after + unknown) / before if before > 0.0 else 0.0
+    change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
+    bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
+    decision = decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}")
+    if share < LEAST_GAIN:
+        log.path += both.log.path
+        log.decisions.append(decision)
+        return below
+    over_both_inputs = [f"Over position and velocity: {each}." for each in both.log.decisions]
+    findings = [*log.findings, *both.log.findings]
+    log.follow(replace(both.log, decisions=[decision], findings=findings), over_both_inputs)
+    return both.best
+
+
+STATIC_CLASSES = (linear, network, hysteresis)
 """Model classes other than constant that do not depend on velocity, the simplest first."""
 
-DYNAMIC_CLASSES = (MassAndDamping, Velocity)
+DYNAMIC_CLASSES = (mass_and_damping, velocity)
 """Model classes with velocity, mass or damping, tried last."""

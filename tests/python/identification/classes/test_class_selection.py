@@ -344,7 +344,7 @@ def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> Non
     assert "--no-hysteresis-nonnegative" in sentence
     assert "--negate" not in sentence
     cured = fit_environment(positions, force, side, IdentifyOptions(hysteresis_nonnegative=False))
-    assert cured.nrmse < 0.01
+    assert cured.errors.nrmse < 0.01
     assert sign_findings(cured) == []
 
 
@@ -353,7 +353,7 @@ def test_negate_is_suggested_only_if_the_opposite_sign_helps() -> None:
     (sentence,) = sign_findings(fit_environment(positions, force, side))
     assert "--negate force" in sentence
     assert "--no-hysteresis-nonnegative" not in sentence
-    assert fit_environment(positions, -force, side).nrmse < 0.01
+    assert fit_environment(positions, -force, side).errors.nrmse < 0.01
 
 
 def test_wavelet_limit_is_reported_if_the_error_is_structured() -> None:

@@ -168,7 +168,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
     fine = np.linspace(0.0, 0.004, 100_001)
     assert g_and_h(bounded, fine)[1].min() >= 0.0
     assert g_and_h(free, fine)[1].min() < 0.0
-    assert bounded.rmse <= 1.02 * free.rmse
+    assert bounded.errors.rmse <= 1.02 * free.errors.rmse
     assert any("press force >= release force imposed" in note for note in bounded.log.notes)
 
 
@@ -240,7 +240,7 @@ def test_fixed_force_is_kept_with_small_error(hysteresis: bool) -> None:
     fixed = fit_environment(x[:, None], y, side, IdentifyOptions(fixed_force=(0.0, 0.03)))
     assert g_and_h(fixed, np.zeros(1))[0][0] == pytest.approx(0.03, abs=1e-7)
     assert abs(g_and_h(free, np.zeros(1))[0][0] - 0.03) > 1e-5
-    assert fixed.rmse <= 1.02 * free.rmse
+    assert fixed.errors.rmse <= 1.02 * free.errors.rmse
     assert any("fixed force" in note and "imposed" in note for note in fixed.log.notes)
 
 
