@@ -183,7 +183,10 @@ class Dynamics:
         self._data, self._evidence = data, options.search.evidence
         self._criterion = on_fitted_rows(options.criterion)
         self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
-        self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
+        self._fixed = [
+            self._filtered(part, np.column_stack([part.force, part.velocity, part.acceleration]))
+            for part in self._parts
+        ]
 
     @property
     def accelerates(self) -> bool:
@@ -373,7 +376,3 @@ class Dynamics:
         response = np.fft.rfft(self._low_pass(impulse, period), 2 * len(impulse))
         correlation = np.fft.irfft(np.abs(response) ** 2)
         return float(np.sum(correlation**2) / correlation[0] ** 2)
-
-
-def _moving(part: Piece) -> tuple[Float1D, Float1D, Float1D]:
-    return part.force, part.velocity, part.acceleration

@@ -13,7 +13,6 @@ the recording, represents all rows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -111,11 +110,6 @@ class Compressor:
         self._force = force[self.kept]
         self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
 
-    @property
-    def rows_used(self) -> int:
-        """Number of recorded rows that are used to represent the recording."""
-        return len(self._force)
-
     def samples(self, only: NDArray[np.bool_] | None = None) -> float:
         """Returns the number of recorded rows that all used rows, or those selected by `only` (n,),
         represent."""
@@ -126,57 +120,54 @@ class Compressor:
 
         `share` (n,) from 0 to 1 multiplies the weights of the rows of the recording.
         """
-        key = self._key
+        cell, positions, force, weight, within = (
+            self._key,
+            self._positions,
+            self._force,
+            self._weight,
+            self._within,
+        )
+        side = None if side is None else side[self.kept]
         if share is not None:
             here = share[self.kept]
-            return self._part(here).rows(None if side is None else side[self.kept][here > 0])
+            on = here > 0
+            cell, positions, force, weight = cell[on], positions[on], force[on], weight[on] * here[on]
+            side = None if side is None else side[on]
+            within *= float(weight.sum() / self._weight.sum())
+        key = cell
         if side is not None:
-            side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
-            key = key + (int(key.max()) + 1) * level
-        weight = self._weight
+            key = cell + (int(cell.max()) + 1) * level
         group, count = _ranked(key, weight)
-        x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
-        y = _mean(group, count, weight * self._force)
-        dy = self._force - y[group]
+        x = np.column_stack([_mean(group, count, weight * column) for column in positions.T])
+        y = _mean(group, count, weight * force)
+        dy = force - y[group]
         merged_side = None
         ds = np.zeros_like(dy)
         if side is not None:
             merged_side = _mean(group, count, weight * side)
             ds = side - merged_side[group]
-        dx = self._positions - x[group]
+        dx = positions - x[group]
         if self._per_axis:
             # The rows of a cell and its neighbours share one slope for all direction states, so that the
             # slopes need the same degrees of freedom in all model classes.
-            block = self._pooled()
+            block = _pooled(cell, (self._per_axis,) * positions.shape[1], weight)
             dy = _without_slopes(dy, dx, block, weight)
             ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds
         if ds.any():
-            part, _ = _ranked(self._key * SIDE_PARTS // (int(self._key.max()) + 1), weight)
+            part, _ = _ranked(cell * SIDE_PARTS // (int(cell.max()) + 1), weight)
             dy = _without_slopes(dy, ds[:, None], part, weight)
-        within = self._within + float(dy @ (weight * dy))
+        within += float(dy @ (weight * dy))
         samples = float(weight.sum())
         scatter = float(weight @ dx[:, 0] ** 2) / samples
         return Compressed(x, y, count, merged_side, within, samples, self._limits, scatter)
 
-    def _part(self, share: NDArray[Any]) -> Compressor:
-        """Returns a compressor of the rows with a share above 0, which multiplies their weights, with the
-        position cells of this compressor."""
-        part, rows = copy(self), share > 0
-        part.kept = np.arange(np.count_nonzero(rows))
-        part._key, part._positions = self._key[rows], self._positions[rows]
-        part._force, part._weight = self._force[rows], self._weight[rows] * share[rows]
-        part._within = self._within * float(part._weight.sum() / self._weight.sum())
-        return part
 
-    def _pooled(self) -> NDArray[np.int64]:
-        """Returns for each row (rows,) the number of the block of neighbouring cells that contains its
-        cell."""
-        d = self._positions.shape[1]
-        grid = (self._per_axis,) * d
-        together = max(2, round(POOLED_CELLS ** (1.0 / d)))
-        pooled = np.array(np.unravel_index(self._key, grid)) // together
-        return _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)[0]
+def _pooled(cell: NDArray[np.int64], grid: tuple[int, ...], weight: Float1D) -> NDArray[np.int64]:
+    """Returns for each row (n,) the number of the block of neighbouring cells that contains its cell."""
+    together = max(2, round(POOLED_CELLS ** (1.0 / len(grid))))
+    pooled = np.array(np.unravel_index(cell, grid)) // together
+    return _ranked(np.ravel_multi_index(tuple(pooled), grid), weight)[0]
 
 
 def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:

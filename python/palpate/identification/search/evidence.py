@@ -302,8 +302,8 @@ class Candidate:
             rows=self.data,
             period=self.data.period,
             play_radius=None if self.play_radius is None else self.play_radius * float(reach[0]),
-            mass=moving and moving.mass,
-            damping=moving and moving.damping,
+            mass=None if moving is None else moving.mass,
+            damping=None if moving is None else moving.damping,
             model_class=self.model_class,
             stop_reason=self.stop_reason,
             n_parameters=self.n_parameters,
@@ -356,7 +356,7 @@ class Samples:
             within=data.within,
             limits=data.limits,
         )
-        self.used = self._compressor.rows_used
+        self.used = len(self._compressor.kept)
         """Number of recorded rows that are used to represent the recording"""
         self._resolved_by = options.search.resolved_by
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
