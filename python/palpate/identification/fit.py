@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from .._typing import Float1D, Float2D
-from ..recording.units import Unit
 from .classes.findings import identified
 from .classes.model_selection import select
 from .data.limits import ForceScale
@@ -27,9 +26,6 @@ def fit_environment(
     *,
     starts: Sequence[int] | None = None,
     names: Sequence[str] | None = None,
-    weight: Float1D | None = None,
-    within: float = 0.0,
-    units: Mapping[str, Unit] | None = None,
 ) -> FittedNetwork:
     """Identifies a force law from arrays.
 
@@ -48,13 +44,6 @@ def fit_environment(
         is tried with the play operator, s = (x - pi)/r (d = 1).
     names : sequence of str, optional
         Names of the inputs, for messages.
-    weight : (n,), optional
-        Number of samples that each row represents, above 0; by default 1.
-    within : float
-        Sum of squared differences of the samples from the force of their row, if a row represents several
-        samples.
-    units : mapping of str to Unit, optional
-        Units of position and force, for the messages.
 
     Returns
     -------
@@ -68,9 +57,7 @@ def fit_environment(
     options = options or IdentifyOptions()
     given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
     side = None if side is None else np.sign(side).astype(float)
-    rows = Rows(tuple(given), positions, force, side, None, starts, (), weight, within, options.period)
-    if units is not None:
-        rows = replace(rows, position_unit=units["position"], force_unit=units["force"])
+    rows = Rows(tuple(given), positions, force, side, starts=starts, period=options.period)
     return fit_rows(rows, options)
 
 

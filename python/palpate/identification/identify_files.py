@@ -42,9 +42,9 @@ from ..recording.rows import LeftOut
 from ..verdict import usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
-from .data.rows import modulo, require_in_range
+from .data.rows import Rows, modulo, require_in_range
 from .data.strokes import DIRECTION_CURE, LEAST_KNOWN_SHARE
-from .fit import fit_environment
+from .fit import fit_rows
 from .identify import model_of
 from .log import Decision, Log, in_words
 from .network.fitted import FittedNetwork
@@ -242,13 +242,11 @@ def require_all_rows(recording: LongRecording, read: PartRead) -> None:
         )
 
 
-def _error_on_rows(
-    summary: Summary, network: FittedNetwork, side: Float1D | None, period: float | None
-) -> float:
+def _error_on_rows(summary: Summary, network: FittedNetwork) -> float:
     """Returns the RMS error of a network on the rows of a summary, with hysteresis on those with a direction;
     the network is taken as straight within a cell."""
-    position, lower = summary.position, float(network.lower[0])
-    if period is not None:
+    position, side, lower = summary.position, network.rows.side, float(network.lower[0])
+    if (period := network.period) is not None:
         position = lower + period * modulo((position - lower) / period)
     model = network.force_model()
     given, rows = {}, summary.count
@@ -280,17 +278,20 @@ def _identified(
             untested = f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"
             log.findings.append(usable(untested))
     with one_thread():
-        network = fit_environment(
+        rows = Rows(
+            ("position",),
             summary.position[:, None],
             summary.force,
             side,
-            settings,
             weight=summary.count,
             within=summary.within,
-            units={role: recordings[0].file_unit(role) for role in ("position", "force")},
+            period=settings.period,
+            position_unit=recordings[0].file_unit("position"),
+            force_unit=recordings[0].file_unit("force"),
         )
+        network = fit_rows(rows, settings)
     spread = float(np.sqrt(summary.variance))
-    rmse = _error_on_rows(summary, network, side, settings.period)
+    rmse = _error_on_rows(summary, network)
     nrmse = rmse / spread if spread > 0 else 0.0
     source, errors = Source.merged(recording.source for recording in recordings), network.errors
     network = replace(
