@@ -258,8 +258,9 @@ _show_options()
 
 def model_of(network: FittedNetwork, units: Mapping[str, str], source: Source, verdict: Verdict) -> Model:
     """Returns the model of an identified network, with its verdict."""
-    return Model(
-        kind=_kind(network),
+    kind = {"kind": "position_velocity"} if network.inputs == VELOCITY_INPUTS else {}
+    return Model.from_network(
+        **kind,
         inputs=network.inputs,
         units=units,
         **network.parameters(),
@@ -284,11 +285,3 @@ def model_of(network: FittedNetwork, units: Mapping[str, str], source: Source, v
             "verdict": verdict.record(),
         },
     )
-
-
-def _kind(network: FittedNetwork) -> str:
-    if network.memory is not None:
-        return "memory"
-    if len(network.inputs) == 1:
-        return "hysteresis" if network.weight_hysteresis is not None else "position"
-    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

@@ -65,7 +65,7 @@ class ClassSelection:
         self.data, self.options, self.classes = data, options, classes
         self.log = Log()
         self.samples = Samples(data, options)
-        self.judge = Judge(self.samples, options, self.log)
+        self.judge = Judge(options, self.log)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
         self._once: dict[Callable[..., Any], tuple[Candidate, Any]] = {}

@@ -57,8 +57,7 @@ class Compressed:
     samples: float
     """Number of represented rows of the recording, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
-    resolution of the force"""
+    """Limits of the information in the rows"""
     scatter: float = 0.0
     """Mean squared distance of the samples of a row from its position, along the first input"""
 

@@ -79,8 +79,7 @@ class Rows:
     counted: Float1D | None = None
     """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
-    resolution of the force"""
+    """Limits of the information in the rows"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
     role: Int8Vector | None = None

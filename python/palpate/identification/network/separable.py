@@ -187,8 +187,7 @@ class SeparableProblem:
     held_out: HeldOutRows | None = None
     """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
-    resolution of the force"""
+    """Limits of the information in the rows"""
     every_input: bool = True
     """True if each wavelet uses every input"""
     prior: float = 0.0

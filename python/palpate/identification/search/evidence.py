@@ -381,15 +381,11 @@ class Samples:
     ) -> SeparableProblem:
         """Returns the least-squares problem of compressed rows with direction states; by default of all."""
         rows = self.rows(strokes) if rows is None else rows
-        held_out = self.held_out_rows(strokes) if self._for_criterion else None
+        held_out = None
+        if self._for_criterion:
+            side, known = (None, True) if strokes is None else (strokes.side, strokes.known)
+            held_out = HeldOutRows.of(self.data.box, self.data.force, side, self._held_out & known)
         return problem_of(rows, resolved_by=self._resolved_by, held_out=held_out)
-
-    def held_out_rows(self, strokes: HysteresisInput | None) -> HeldOutRows:
-        """Returns the held-out rows with a known direction state."""
-        if strokes is None:
-            return HeldOutRows.of(self.data.box, self.data.force, None, self._held_out)
-        rows = self._held_out & strokes.known
-        return HeldOutRows.of(self.data.box, self.data.force, strokes.side, rows)
 
 
 def local_noise_ratio(below: Candidate, above: Candidate) -> float:
@@ -416,15 +412,13 @@ class Judge:
 
     Parameters
     ----------
-    samples : Samples
     options : IdentifyOptions
     log : Log
         Receives the decisions of `better`.
     """
 
-    def __init__(self, samples: Samples, options: IdentifyOptions, log: Log) -> None:
-        self.criterion, self.evidence = options.criterion, options.search.evidence
-        self._samples, self._log = samples, log
+    def __init__(self, options: IdentifyOptions, log: Log) -> None:
+        self.criterion, self.evidence, self._log = options.criterion, options.search.evidence, log
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
         """Returns the more complex candidate if it is accepted, else the simpler candidate; adds the decision
@@ -463,8 +457,8 @@ class Judge:
             return decided(above.model_class, False, reason)
         falls = self.fall(below, above)
         change = lowered(CRITERION_NAMES[name], falls)
-        if name in ON_HELD_OUT_ROWS:
-            evidence = max(evidence, standard_error(len(self._samples.held_out_rows(above.strokes).force)))
+        if (held_out := above.problem.held_out) is not None:
+            evidence = max(evidence, standard_error(len(held_out.force)))
         if falls < evidence:
             change += f", must lower it by at least {evidence:.4g}"
         return decided(above.model_class, falls >= evidence, change)
