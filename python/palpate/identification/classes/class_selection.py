@@ -31,7 +31,7 @@ from ..network.constraints import (
 from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Judge, Samples, criterion_of
-from ..search.growth import Grown, Growth
+from ..search.growth import Growth
 from .dynamics import Dynamics
 
 Value = TypeVar("Value")
@@ -123,12 +123,19 @@ class ClassSelection:
         return Dynamics(data, self.options) if decides else None
 
     def grown(
-        self, problem: SeparableProblem, start: Basis, model_class: str, most: int | None = None
-    ) -> Grown:
-        """Grows a network from the wavelets of `start` and reports the tested networks."""
+        self,
+        problem: SeparableProblem,
+        start: Basis,
+        model_class: str,
+        *,
+        most: int | None = None,
+        strokes: HysteresisInput | None = None,
+    ) -> Candidate:
+        """Returns the candidate of a network that grows from the wavelets of `start`, and reports the tested
+        networks."""
         grown = self.growth.grow(problem, start, model_class, most=most)
         self.log.path.extend(grown.path)
-        return grown
+        return self.candidate(model_class, grown.problem, grown.solution, grown.stop_reason, strokes=strokes)
 
     def recorded(self, candidate: Candidate) -> Candidate:
         """Adds a candidate to the list of tested networks and returns it."""
@@ -247,13 +254,11 @@ def linear(selection: ClassSelection, below: Candidate) -> Candidate:
 def network(selection: ClassSelection, below: Candidate) -> Candidate:
     """Fits a wavelet network over the inputs; they decide the name of its model class: position, velocity,
     network."""
-    problem, most = selection.problem, selection.options.max_wavelets
-    start = Basis.empty(problem.dimension)
-    if most == 0 or problem.n_parameters(start, more=1) >= problem.samples:
+    problem, start = selection.problem, Basis.empty(selection.problem.dimension)
+    if selection.options.max_wavelets == 0 or problem.n_parameters(start, more=1) >= problem.samples:
         return below
     name = NETWORK_CLASSES.get(selection.data.names, "network")
-    grown = selection.grown(problem, start, name, most)
-    found = selection.candidate(name, grown.problem, grown.solution, grown.stop_reason)
+    found = selection.grown(problem, start, name)
     return selection.judge.better(below, selection.constrained(found))
 
 

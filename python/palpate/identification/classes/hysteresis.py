@@ -189,10 +189,10 @@ class Hysteresis:
             if complete and strokes is before:
                 break
             limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
-            grown = selection.grown(samples.problem(strokes), basis, self.name, limit)
-            basis, reason = grown.solution.basis, grown.stop_reason
-            found = selection.candidate(self.name, grown.problem, grown.solution, reason, strokes=strokes)
-            complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
+            problem, passed = samples.problem(strokes), len(selection.log.path)
+            found = selection.grown(problem, basis, self.name, most=limit, strokes=strokes)
+            basis, path = found.solution.basis, selection.log.path[passed:]
+            complete = limit == most or max(point.n_wavelets for point in path) < limit
         return found
 
     def _weighted(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
