@@ -301,7 +301,7 @@ RULES = (
     constant("recording.roles.roles_of", "AIR_MARGIN", 1.0),
     constant("recording.roles.contact_at", "FORCE_FLOOR", 1.0, "recording.contact"),
     constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
-    constant("identification.identify.period_of", "LEAST_SHARE", 0.999, f"{DATA}.period"),
+    constant("identification.identify.period_of", "LEAST_GAIN", 0.999, f"{DATA}.period"),
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
     constant(f"{CLASSES}.findings.left_out_residual", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),
     constant(f"{CLASSES}.model_selection.correlated_noise", "LEAST_INDEPENDENT_SHARE", 0.0),

@@ -30,14 +30,14 @@ from ...recording.motion import (
 )
 from ...recording.units import unit_of_dynamics
 from ...verdict import FORCE_FLOOR, Finding, force_jnd, usable
-from ..data.limits import evenly_spread
+from ..data.limits import LEAST_GAIN, evenly_spread
 from ..data.rows import Rows, modulo
 from ..data.strokes import HysteresisInput
 from ..log import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, factored, solved
 from ..options import IdentifyOptions
-from ..search.evidence import CRITERION_NAMES, LEAST_GAIN, Moving, deviance, on_fitted_rows
+from ..search.evidence import CRITERION_NAMES, Moving, deviance, on_fitted_rows
 
 FOLDS = 10
 """Number of groups of sections of the recording for a test of damping and mass; each group is held out once.

@@ -24,16 +24,17 @@ from ...recording.contact import contact_at
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocities
 from ...recording.roles import Role, roles_of
 from ...verdict import Finding, usable
+from ..data.limits import LEAST_GAIN
 from ..data.rows import Rows, rows_of
 from ..fit import fit_rows
 from ..log import Decision, Log, decided, lowered, squared_error_change
 from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
-from ..search.evidence import LEAST_GAIN, deviance, on_fitted_rows
+from ..search.evidence import deviance, on_fitted_rows
 from .causes import FIRST, LATER, cause_of
 from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
-from .memory_fit import STEPS, MemoryFit, Motion, Ranges, Resting, Shape
+from .memory_fit import CURVE_POINTS, STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
@@ -42,9 +43,6 @@ used."""
 SPLINES = (4, 6, 8, 11, 15, 20, 28)
 """Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
 relaxation test determine the force at rest between its positions."""
-
-CURVE_POINTS = 257
-"""Number of positions at which the force at rest is passed on to its identification."""
 
 MOST_BRANCHES = 6
 """Largest number of branches; the core allows 8."""

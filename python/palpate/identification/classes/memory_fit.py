@@ -39,8 +39,9 @@ STEPS = 12
 LEAST_RATIO = 0.02
 """Smallest ratio over the domain, as a share of its mean [-]."""
 
-RATIO_POINTS = 201
-"""Number of positions at which the least ratio is computed."""
+CURVE_POINTS = 257
+"""Number of positions at which the least ratio is computed, and at which the force at rest is passed on to
+its identification."""
 
 LEAST_INDEPENDENT = 30.0
 """Least number of rows that count as independent."""
@@ -138,7 +139,7 @@ class Shape:
         positive."""
         weight, beta, log_alpha = self.wavelets.T
         free = Ratio(np.exp(log_alpha), beta, weight, self.slope, 1.0 - 0.5 * self.slope)
-        values = np.asarray(free.network.force(np.linspace(0.0, 1.0, RATIO_POINTS)))
+        values = np.asarray(free.network.force(np.linspace(0.0, 1.0, CURVE_POINTS)))
         lift = max(0.0, LEAST_RATIO * max(float(values.mean()), LEAST_RATIO) - float(values.min()))
         largest = float(values.max()) + lift
         return Ratio(free.alpha, beta, weight / largest, self.slope / largest, (free.bias + lift) / largest)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.limits import (
+    LEAST_GAIN,
     LEAST_INDEPENDENT_SHARE,
     MOST_COMPARED_ROWS,
     correlation,
@@ -19,7 +20,7 @@ from ..data.limits import (
 from ..data.rows import Rows
 from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
-from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
+from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
 from .causes import FASTER, cause_of
 from .class_selection import (
     REGROWTH_ERROR_RATIO,

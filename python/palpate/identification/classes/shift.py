@@ -13,10 +13,11 @@ import scipy
 
 from ..._typing import Float1D
 from ...recording.motion import LONGEST_LAG_S, noise_of
+from ..data.limits import LEAST_GAIN
 from ..data.strokes import HysteresisInput
 from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution
-from ..search.evidence import LEAST_GAIN, Candidate, Samples, criterion_of
+from ..search.evidence import Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
 from .repeatability import left_out_residual
 

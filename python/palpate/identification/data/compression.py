@@ -237,9 +237,9 @@ def around_seam(rows: Compressed) -> Compressed:
 HELD_OUT_EVERY = 5
 """One of five rows, or one of five sections of the recording, is held out."""
 
-HELD_OUT_BLOCKS = 50
+SECTIONS = 50
 """Number of sections of a recording, of which every fifth is held out as a whole: adjacent samples are
-correlated."""
+correlated. Of very long recordings as many sections are fitted."""
 
 
 @dataclass(frozen=True)
@@ -272,9 +272,9 @@ def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
     """Returns the held-out rows (n,): sections of the recording if the starts of motions are given and rows
     suffice, else single rows."""
     index = np.arange(n)
-    if starts is None or n < HELD_OUT_EVERY * HELD_OUT_BLOCKS:
+    if starts is None or n < HELD_OUT_EVERY * SECTIONS:
         return np.asarray(index % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
-    return np.asarray(index * HELD_OUT_BLOCKS // n % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
+    return np.asarray(index * SECTIONS // n % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
 
 
 def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:

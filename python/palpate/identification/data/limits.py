@@ -16,6 +16,11 @@ from ..._typing import Float1D, Float2D
 from ...recording.motion import SIGNIFICANT_STANDARD_ERRORS
 from ..options import IdentifyOptions
 
+LEAST_GAIN = 0.25
+"""Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]:
+these forces are harder to render and to certify. A longer period must explain it too: a straight line over
+the travel, taken modulo at most half of it, explains no more."""
+
 PROBED_ROWS = 7
 """Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
 whole table is searched for repeated rows."""
@@ -26,10 +31,6 @@ LEAST_LEVELS = 3
 ROWS_PER_LEVEL = 2.0
 """Least number of rows for each distinct force value [-]: equal differences of force values are then not a
 coincidence."""
-
-MOST_SAMPLED_ROWS = 8192
-"""About this number of evenly spread rows is tested for few distinct force values, before all rows are
-searched for a force step."""
 
 GRID_TOLERANCE = 0.02
 """Largest deviation of a force difference from a multiple of the force step [steps]."""
@@ -127,9 +128,6 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
 def force_step(force: Float1D) -> float:
     """Returns the step of a force whose values differ by multiples of one step; 0 if there is no such
     step."""
-    sample = force[:: max(1, len(force) // MOST_SAMPLED_ROWS)]
-    if len(np.unique(sample)) * ROWS_PER_LEVEL > len(sample):
-        return 0.0
     levels = np.unique(force)
     if len(levels) < LEAST_LEVELS or len(levels) * ROWS_PER_LEVEL > len(force):
         return 0.0

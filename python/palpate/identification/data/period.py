@@ -13,7 +13,7 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.conversion import MIN_ROWS
 from ...recording.motion import directions_of
-from .limits import standard_deviation
+from .limits import LEAST_GAIN, standard_deviation
 from .strokes import turns_before
 
 LEAST_CORRELATION = 0.5
@@ -24,10 +24,6 @@ REVOLUTION = 2.0 * np.pi
 
 SAME_STEP = 1e-3
 """Share of a step by which rounding in a file may change it [-]."""
-
-LEAST_SHARE = 0.25
-"""Least share of the squared difference of repeats that a longer period must explain [-]: a straight
-line over the travel, taken modulo at most half of it, explains no more."""
 
 HARMONICS = 6
 """Number of harmonics of the fit that refines a period; with 4 or 12 the period has the same error."""
@@ -69,7 +65,7 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
     curve = _curve(np.mod(box / wave, 1.0), share, max(round(cells * wave), 1))
     step = cells * float(np.median(np.diff(np.unique(box))))
     rounding = step**2 / 12.0 * float(np.mean(np.diff(curve) ** 2))
-    allowed = max(squared_error(count * wave), rounding) / (1.0 - LEAST_SHARE)
+    allowed = max(squared_error(count * wave), rounding) / (1.0 - LEAST_GAIN)
     divisors = (each for each in range(1, count + 1) if count % each == 0)
     waves = next(each for each in divisors if squared_error(each * wave) <= allowed)
     period = waves * wave
@@ -78,7 +74,7 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
     if (revolution := revolution_of(recordings)) is not None:
         # The force repeats after a revolution, of which its period is exactly a part.
         part = revolution / travel / max(round(revolution / travel / period), 1)
-        if (1.0 - LEAST_SHARE) * squared_error(part) <= squared_error(period):
+        if (1.0 - LEAST_GAIN) * squared_error(part) <= squared_error(period):
             period = part
     return travel * period
 
@@ -102,7 +98,7 @@ def revolution_of(recordings: Sequence[Recording]) -> float | None:
         return float(gap.max(initial=0.0)), float(step @ step)
 
     along, around = steps(position), steps(np.mod(position, REVOLUTION), REVOLUTION)
-    closed = around[0] <= (1.0 + SAME_STEP) * along[0] and (1.0 - LEAST_SHARE) * around[1] <= along[1]
+    closed = around[0] <= (1.0 + SAME_STEP) * along[0] and (1.0 - LEAST_GAIN) * around[1] <= along[1]
     return REVOLUTION if closed else None
 
 

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from ...recording import Recording
 from ...recording.conversion import Motion
+from .compression import SECTIONS
 
 MOST_ROWS = 500_000
 """Largest number of rows that are all fitted; of longer recordings about this number is used."""
-
-SECTIONS = 50
-"""Number of sections of all recordings together."""
 
 BLOCKS = 10
 """Number of blocks of rows in a section. A block is added for each interval without rows in the sections."""

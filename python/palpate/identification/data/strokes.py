@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
+from ...recording.checks.recordings import PRESS_ABOVE_SHARE
 from ...recording.motion import FORCE_RESOLUTION, ordered_strokes, states_its_order, turns_of
 from ...verdict import usable
 from ..log import Decision, Log
@@ -23,10 +24,6 @@ TRAVEL_CELLS = 32
 
 LEAST_KNOWN_SHARE = 0.5
 """Hysteresis is tested only if the direction state of at least this share of the rows is known [-]."""
-
-LEAST_CONSISTENT_SHARE = 0.9
-"""If the force of one recording is above that of another in at least this share of the position cells, the
-recording with the higher force is taken as press, the other one as release [-]."""
 
 LEAST_MEAN_DIFFERENCE = 0.05
 """Least mean force difference of two recordings for press and release [standard deviations of the force].
@@ -171,7 +168,7 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
         if len(apart) < TRAVEL_CELLS // 2 or abs(apart.mean()) < LEAST_MEAN_DIFFERENCE * deviation:
             return 0
         sign = int(np.sign(apart.mean()))
-        return sign if np.mean(np.sign(apart) == sign) >= LEAST_CONSISTENT_SHARE else 0
+        return sign if np.mean(np.sign(apart) == sign) >= PRESS_ABOVE_SHARE else 0
 
     first = np.array([above(recording, recordings[0]) for recording in recordings])
     if not first.any() or ((first > 0).any() and (first < 0).any()):

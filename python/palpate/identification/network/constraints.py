@@ -43,8 +43,9 @@ MOST_HALVINGS = 40
 """Number of halvings after which an undecided interval counts as a violation: its width is then a rounding
 error."""
 
-PROJECTION_CELLS = 4096
-"""Number of cells of the position grid on which the slope of a force is limited."""
+COMPARED_POSITIONS = 4097
+"""Number of positions at which press and release are compared, and at which the slope of a force is
+limited."""
 
 MOST_ALTERNATIONS = 50
 """Largest number of alternating projections of a force onto the lower and the upper slope bound."""
@@ -145,7 +146,7 @@ def moved_to_bounds(
     wavelets. The hysteresis is limited at each position, h := max(h, 0), and slopes by isotonic regression.
     """
     bounds = [bound for bound in bounds if not bound.seam]
-    grid = np.linspace(0.0, 1.0, PROJECTION_CELLS + 1)
+    grid = np.linspace(0.0, 1.0, COMPARED_POSITIONS)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
     before = readings.copy()
     mix = np.array([[1.0, 1.0], [1.0, -1.0]])[: len(readings), : len(readings)]
@@ -330,9 +331,6 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
     mixed = (1.0 - kept) * solution.coefficients + kept * safe
     return problem.with_coefficients(solution, mixed)
 
-
-COMPARED_POSITIONS = 2048
-"""Number of positions at which press force and release force are compared."""
 
 REPORTED_HEIGHT = 3.0
 """Release force above press force is reported only from this difference on [multiples of the RMS error]:

@@ -36,10 +36,6 @@ from ..network.fitted import FittedNetwork, parameters_of
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
-LEAST_GAIN = 0.25
-"""Least share of the squared error that damping, mass, velocity as an input, or a memory must explain [-]:
-these forces are harder to render and to certify."""
-
 ALL_ROWS = slice(None)
 """Every row."""
 

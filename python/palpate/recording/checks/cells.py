@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..recording import Recording
 
 MOST_CELLS = 64
-"""Largest number of equal intervals (cells) into which the positions of a recording are divided."""
+"""Largest number of equal intervals (cells) of the positions of a recording, and of points of a curve."""
 
 LEAST_ROWS_PER_CELL = 8
 """Mean number of rows for each stroke and position cell; it sets the number of cells of a short recording."""

@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 from ..._typing import Float1D
 from ...verdict import Finding, no, usable
 from ..units import GRAVITY
-from .cells import sides
+from .cells import MOST_CELLS, sides
 
 if TYPE_CHECKING:
     from ..recording import Recording
-
-MOST_CURVE_POINTS = 64
-"""Largest number of points of a curve of force over position."""
 
 ROWS_PER_POINT = 4
 """Mean number of rows that are averaged for one point of a curve of force over position."""
@@ -54,7 +51,8 @@ It is computed after the change of unit, and divided by the force's standard dev
 PRESS_ABOVE_SHARE = 0.9
 """Share of positions at which the press force must exceed the release force, for one object with hysteresis.
 
-Otherwise a recorded press and a recorded release that differ are reported as two objects.
+Otherwise a recorded press and a recorded release that differ are reported as two objects. Without directions
+the recording with the higher force is then taken as press, the other one as release.
 """
 
 LARGEST_RANGE_RATIO = 2.0
@@ -153,7 +151,7 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
     lower, length = float(x.min()), float(np.ptp(x))
     if not length > 0.0:
         return x[:1], f[:1]
-    cells = int(np.clip(len(x) // ROWS_PER_POINT, 2, MOST_CURVE_POINTS))
+    cells = int(np.clip(len(x) // ROWS_PER_POINT, 2, MOST_CELLS))
     cell = np.minimum((cells * ((x - lower) / length)).astype(np.intp), cells - 1)
     count = np.bincount(cell, minlength=cells)
     filled = count > 0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from palpate.identification.data.compression import (
-    HELD_OUT_BLOCKS,
+    SECTIONS,
     Compressed,
     Compressor,
     held_out_rows,
@@ -81,7 +81,7 @@ def test_held_out_rows_of_a_motion_are_stretches() -> None:
     scattered, stretches = held_out_rows(10_000, None), held_out_rows(10_000, (0,))
     assert scattered.mean() == pytest.approx(0.2)
     assert stretches.mean() == pytest.approx(0.2)
-    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * HELD_OUT_BLOCKS / 5
+    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * SECTIONS / 5
 
 
 def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None:
