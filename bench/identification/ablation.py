@@ -300,7 +300,6 @@ RULES = (
     constant("recording.roles.wrong_readings", "LEAST_WRONG", 0.0, f"{CHECKS}.wrong_readings"),
     constant("recording.roles.roles_of", "AIR_MARGIN", 1.0),
     constant("recording.roles.contact_at", "FORCE_FLOOR", 1.0, "recording.contact"),
-    constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
     constant("identification.identify.period_of", "LEAST_GAIN", 0.999, f"{DATA}.period"),
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
     constant(f"{CLASSES}.findings.left_out_residual", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),

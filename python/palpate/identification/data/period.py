@@ -16,9 +16,6 @@ from ...recording.motion import directions_of
 from .limits import LEAST_GAIN, standard_deviation
 from .strokes import turns_before
 
-LEAST_CORRELATION = 0.5
-"""Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
-
 REVOLUTION = 2.0 * np.pi
 """Period of every force over the angle of a shaft that turns without end [rad]."""
 
@@ -201,7 +198,7 @@ def _repeat(curve: Float1D) -> tuple[float, int] | None:
     peaks = 1 + np.flatnonzero((inner >= correlation[:-2]) & (inner > correlation[2:]))
     # A smooth force is similar to itself at short distances; a repeat follows a distance at which it is not.
     peaks = peaks[peaks >= (apart[0] if len(apart) else n)]
-    if not len(peaks) or correlation[peaks].max() < LEAST_CORRELATION:
+    if not len(peaks) or correlation[peaks].max() < LEAST_GAIN:
         return None
     # The spectrum has a value for every half wave over the curve, which must hold at least two waves.
     waves = 2.0 + 0.5 * int(np.argmax(power[4:]))
