@@ -61,9 +61,6 @@ LEAST_SHARE_IN_BAND = 0.5
 rows of one recording differ from the model in a similar way, so that single repeats can have fewer than 95
 %."""
 
-MOST_SHARED = 0.5
-"""Largest weight of a row whose error is mostly one that it shares with the other rows behind turns [-]."""
-
 STRUCTURED_CORRELATION = 0.5
 """Lag-1 autocorrelation above which the error is structured [-]."""
 
@@ -134,7 +131,7 @@ class Verification:
     @property
     def judged_strokes(self) -> tuple[Stroke, ...]:
         """The same without the rows behind turns that share an error"""
-        return self.strokes if self.prediction.side is None else self._strokes(self.weight > MOST_SHARED)
+        return self.strokes if self.prediction.side is None else self._strokes(self.weight == 1.0)
 
     def _strokes(self, kept: NDArray[np.bool_]) -> tuple[Stroke, ...]:
         recording, rows = self.recording, np.flatnonzero(self.rows)[kept]
