@@ -262,7 +262,6 @@ RULES = (
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
     Rule("noise where candidates differ", f"{SEARCH}.evidence", "local_noise_ratio", _one),
-    Rule("no finer than repeats", f"{CLASSES}.model_selection", "no_finer_than_repeats", _first),
     Rule("finer wavelets", f"{SEARCH}.growth", "LEAST_CORE_POSITIONS", np.inf),
     Rule("pruning", f"{SEARCH}.growth", "MOST_PRUNE_TRIALS", 0),
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),

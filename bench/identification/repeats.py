@@ -70,12 +70,6 @@ def of_one_object(recordings: Sequence[Recording]) -> Fitted:
     return Fitted(lambda x: np.asarray(model.force(x)), model.n_parameters, model.band.half_width)
 
 
-def of_rows(recordings: Sequence[Recording]) -> Fitted:
-    """Identifies a model from the rows of all recordings, as if they were one recording."""
-    model = identify(*_rows(recordings))
-    return Fitted(lambda x: np.asarray(model.force(x)), model.n_parameters)
-
-
 def of_first_recording(recordings: Sequence[Recording]) -> Fitted:
     model = identify(recordings[0])
     return Fitted(lambda x: np.asarray(model.force(x)), model.n_parameters)
@@ -110,7 +104,6 @@ def _rows(recordings: Sequence[Recording]) -> tuple[Array, Array]:
 
 METHODS: Mapping[str, Callable[[Sequence[Recording]], Fitted]] = {
     SEVERAL: of_one_object,
-    "palpate, all rows as one recording": of_rows,
     "palpate, one recording": of_first_recording,
     "smoothing spline": spline,
     YEOH: yeoh,

@@ -31,7 +31,6 @@ from .class_selection import (
 )
 from .findings import USABLE_NRMSE, judged_candidate
 from .hysteresis import hysteresis
-from .repeatability import no_finer_than_repeats
 from .shift import shift_of
 
 SETTLED_INDEPENDENT_RATIO = 0.8
@@ -43,7 +42,7 @@ def select(rows: Rows, options: IdentifyOptions) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them."""
     found = correlated_noise(ClassSelection(rows.limited(), options, STATIC_CLASSES))
     found.try_classes(DYNAMIC_CLASSES)
-    return no_finer_than_repeats(found)
+    return found
 
 
 def correlated_noise(first: ClassSelection) -> ClassSelection:

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several recordings of one object: growth ends where the model is as good as the object repeats, and a check
-with one recording left out at a time."""
+"""Rows and recordings that are left out of the fit: the error on them, and the band of several recordings."""
 
 from __future__ import annotations
 
@@ -18,61 +17,11 @@ from ..data.limits import distinct_rows
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.basis import Basis
 from ..network.separable import SeparableProblem, Solution, problem_of
-from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
+from ..search.evidence import Candidate
 from .class_selection import ClassSelection
-
-MOST_EXCESS = 1.02
-"""Ratio of the RMS error of a model to that of the mean of all recordings, up to which a smaller network is
-taken [-]. The error on a further recording then grows by less than 2 %."""
-
-STOPPED_BY_REPEATS = "repeats"
-"""Reason why growth stopped, if the model is as good as the object repeats."""
 
 NO_BAND = "The recordings have few common positions, so that the model has no band."
 """Note on several recordings that cannot be compared."""
-
-
-def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
-    """Selects the smallest network that is as good as the recordings repeat.
-
-    Rows of one recording differ from the mean of all recordings in a similar way. A criterion that counts
-    rows therefore accepts wavelets that fit the differences between few recordings. Here errors below the
-    differences between the recordings do not count, and the smallest number of wavelets with such an error is
-    searched by bisection. A model with mass, damping or velocity is kept: the recordings may differ because
-    their speeds do.
-    """
-    data, best, options = first.data, first.best, first.options
-    if data.repeats is None or best.data is not data or best.moving is not None or best.n_wavelets == 0:
-        return first
-    if options.criterion in ON_HELD_OUT_ROWS or len(data.names) > 1:
-        return first
-    apart = _pure_error(best, data.repeats) or 0.0
-    least = MOST_EXCESS * apart
-    if least <= max(data.limits.force_error, best.rmse):
-        return first  # the recordings repeat better than the model
-    coarse = replace(data, limits=replace(data.limits, force_error=least))
-    smaller, size, too_few = first, best.n_wavelets, -1
-    while size > too_few:
-        trial = ClassSelection(coarse, replace(options, max_wavelets=size), first.classes)
-        if trial.best.rmse <= least and trial.best.n_parameters <= best.n_parameters:
-            smaller = trial
-        elif smaller is first:
-            return first
-        else:
-            too_few = size
-        size = (smaller.best.n_wavelets + too_few) // 2
-    if smaller.best.n_parameters >= best.n_parameters:
-        return first
-    smaller.options = options
-    smaller.best = replace(smaller.best, stop_reason=STOPPED_BY_REPEATS)
-    tested = {decision.model_class for decision in smaller.log.decisions}
-    smaller.log.decisions += [each for each in first.log.decisions if each.model_class not in tested]
-    smaller.log.replaces(
-        first.log,
-        f"The recordings differ from their mean by {data.force_unit.text(apart)} RMS, so that "
-        f"{best.n_wavelets - smaller.best.n_wavelets} of {best.n_wavelets} wavelets were not needed.",
-    )
-    return smaller
 
 
 def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, ...]]:

@@ -102,8 +102,8 @@ class FittedNetwork:
     model_class: str = ""
     """Name of the accepted model class"""
     stop_reason: str = ""
-    """Reason why growth stopped: name of the criterion, "max_wavelets", "held-out rows", "repeats" if the
-    recordings do not repeat better, or "data" if no wavelet could be added"""
+    """Reason why growth stopped: name of the criterion, "max_wavelets", "held-out rows", or "data" if
+    no wavelet could be added"""
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
     errors: Errors = Errors()
