@@ -301,7 +301,6 @@ RULES = (
     constant("recording.roles.contact_at", "FORCE_FLOOR", 1.0, "recording.contact"),
     constant("identification.identify.period_of", "LEAST_GAIN", 0.999, f"{DATA}.period"),
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
-    constant(f"{CLASSES}.findings.left_out_residual", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),
     constant(f"{CLASSES}.model_selection.correlated_noise", "LEAST_INDEPENDENT_SHARE", 0.0),
     constant(f"{CLASSES}.findings.place_findings", "PLACES", 200, f"{CLASSES}.causes"),
     constant(f"{CLASSES}.findings.place_findings", "PLACE_ERRORS", 0.0),

@@ -62,19 +62,15 @@ def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, 
 
 
 Fit = Callable[[SeparableProblem, Basis], Solution]
-"""Fits a network with these wavelets, or one that grows from them."""
-
-FEW_ROWS = 500
-"""Number of rows up to which a network is grown again for the error on left out rows; more rows change its
-wavelets little, and only its numbers are fitted again."""
+"""Fits a network with these wavelets, or one that is refined from them."""
 
 
 def left_out_residual(selection: ClassSelection) -> Float1D:
     """Returns the residual (n,) of rows that are left out of the fit, a fifth of them at a time.
 
-    A network of few rows is grown again on the other rows. The numbers of another model are fitted again to
-    them by a few steps. Rows with correlated noise are left out together, and so are all rows at one position
-    in one direction: a row whose position is known from another stroke does not test the force between rows.
+    The numbers of the model are fitted again to the other rows, those of a model over one position by a few
+    steps. Rows with correlated noise are left out together, and so are all rows at one position in one
+    direction: a row whose position is known from another stroke does not test the force between rows.
     """
     best = selection.best
     data, used = best.data, best.error.weight > 0.0
@@ -87,10 +83,8 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     )
     fold = np.full(len(used), -1)
     fold[rows] = (first // together % HELD_OUT_EVERY)[at_place]
-    residual, growth = best.error.residual.copy(), selection.growth
-    fit: Fit = SeparableProblem.solve
-    if len(data.names) == 1:
-        fit = growth.grown_again if len(rows) <= FEW_ROWS else growth.refined
+    residual = best.error.residual.copy()
+    fit: Fit = selection.growth.refined if len(data.names) == 1 else SeparableProblem.solve
     for number in range(HELD_OUT_EVERY):
         again, left = _left_out(
             best, compressor, force, used & (fold != number), used & (fold == number), fit

@@ -398,12 +398,6 @@ class Growth:
         """Returns the network with these wavelets, refined by as many steps as follow each added wavelet."""
         return self._improved(problem, problem.solve(basis), self._search.refine_steps)[1]
 
-    def grown_again(self, problem: SeparableProblem, basis: Basis) -> Solution:
-        """Returns a network that grows as the one with the wavelets `basis` did on other rows."""
-        if not len(basis) or self._criterion in ON_HELD_OUT_ROWS:
-            return self.refined(problem, basis)
-        return self.grow(problem, Basis.empty(problem.dimension), "left out rows").solution
-
     def _improved(
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
     ) -> tuple[SeparableProblem, Solution]:
