@@ -53,9 +53,8 @@ def identify(
     Parameters
     ----------
     recording : Recording, path, DataFrame, a list of these, or (n,) array_like
-        Several recordings of one object are identified together; their units must agree. The network is then
-        only as large as the differences between them allow, and the model has a band. With `force` it is the
-        array of positions [m or rad], which grow into the object.
+        Several recordings of one object are identified together; their units must agree. The model then has a
+        band. With `force` it is the array of positions [m or rad], which grow into the object.
     force : (n,) array_like, optional
         Force of the object against the tool [N or N*m].
     time : (n,) array_like, optional

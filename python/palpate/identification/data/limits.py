@@ -39,9 +39,6 @@ STEP_ERROR = 1.0 / 3.0
 """RMS error divided by the step of the recorded force, below which the step hides the error [-]; uniform
 rounding errors have 1/sqrt(12)"""
 
-LEAST_CORRELATION = 0.15
-"""Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
-
 LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
 as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
@@ -67,8 +64,7 @@ class RowLimits:
     independent: float = 1.0
     """Share of the rows that are independent (0, 1]"""
     force_error: float = 0.0
-    """RMS error that the force step or the differences between repeats hide [force]; a criterion does not
-    count smaller errors"""
+    """RMS error that the force step hides [force]; a criterion does not count smaller errors"""
     position_gap: float = 0.0
     """Gap between neighbouring positions that bounds the harmonics of a periodic force [share of the
     period]"""
@@ -164,8 +160,8 @@ def correlation(residual: Float1D) -> float:
     if len(residual) < 2:
         return 0.0
     found = neighbour_correlation(residual)
-    limit = max(LEAST_CORRELATION, SIGNIFICANT_STANDARD_ERRORS / float(np.sqrt(len(residual))))
-    return found if evenness(residual) >= LEAST_NOISE_EVENNESS and found > limit else 0.0
+    significant = found * float(np.sqrt(len(residual))) > SIGNIFICANT_STANDARD_ERRORS
+    return found if significant and evenness(residual) >= LEAST_NOISE_EVENNESS else 0.0
 
 
 def independent_share(rho: float) -> float:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_steps
 from ..._typing import Float1D, Float2D
-from ...recording.motion import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION, SIGNIFICANT_STANDARD_ERRORS
 from ..data.compression import Compressed, HeldOutRows
 from ..data.limits import NO_LIMITS, RowLimits, evenness, neighbour_correlation
 from .basis import Basis, Resolution
@@ -74,9 +74,6 @@ def factored(gram: Float2D) -> Float2D:
 CORE_RADIUS = float(np.sqrt(3.0))
 """Half width of a wavelet's core, the part between its two side lobes, in the scaled distance u from the
 wavelet's centre [-]; the data must resolve the core."""
-
-SIGNIFICANT_CORRELATION = 3.0
-"""Correlation of neighbouring residuals above which the residuals are not noise [standard errors]."""
 
 LEAST_SLIDING_INPUT = 0.9
 """Absolute direction state |s| above which a row belongs to a stroke [-]."""
@@ -249,7 +246,7 @@ class SeparableProblem:
     def structured(self, solution: Solution) -> bool:
         """True if residuals at neighbouring rows of some block are correlated."""
         return any(
-            neighbour_correlation(left) * math.sqrt(len(left)) > SIGNIFICANT_CORRELATION
+            neighbour_correlation(left) * math.sqrt(len(left)) > SIGNIFICANT_STANDARD_ERRORS
             for left in solution.residuals
         )
 

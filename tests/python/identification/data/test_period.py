@@ -34,6 +34,16 @@ def test_the_period_is_that_of_the_detents(detents: int) -> None:
     assert period_of([turned(TURNS, knob(TURNS, detents))]) == pytest.approx(360.0 / detents, rel=3e-4)
 
 
+@pytest.mark.parametrize("detents", [5, 6])
+def test_few_detents_with_a_gap_between_them_have_their_period(detents: int) -> None:
+    angle = press_and_release(1000, 1.0)
+    torque = np.sin(2.0 * np.pi * detents * angle) + np.random.default_rng(0).normal(0.0, 0.02, len(angle))
+    rows = (angle < 0.3) | (angle > 0.65)
+    way = np.repeat([1.0, -1.0], 1000)
+    recording = Recording.from_arrays(angle[rows], torque[rows], direction=way[rows])
+    assert period_of([recording]) == pytest.approx(1.0 / detents, rel=1e-3)
+
+
 def test_a_coarse_encoder_and_several_recordings_give_the_same_period() -> None:
     step = 360.0 / 1024
     coarse = np.round(TURNS / step) * step
