@@ -60,11 +60,11 @@ FIRST_PRESS = re.compile(r"first (press|stroke)")
 """Words with which a note or the verdict names a first press that differs from the later ones"""
 
 LIMITS = {
-    "late force": "late force",
-    "coarse force": "late force",
+    "late force": "a late force",
+    "coarse force": "a late force",
     "backlash": "backlash",
-    "drift": "moved zero",
-    "second zero": "moved zero",
+    "drift": "a moved zero",
+    "second zero": "a moved zero",
 }
 """Operator -> what one loop can hide of its fault, as a decision on a model names it"""
 
@@ -244,9 +244,7 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
         "pull_jnd": truth.pull(model),
         "verdict": model.verdict.level,
         "reasons": list(model.verdict.reasons),
-        "untested": [
-            each.split(":")[0] for each in model.notes.get("model_selection", ()) if ": not tested" in each
-        ],
+        "untested": [each for each in model.notes.get("model_selection", ()) if ": not tested" in each],
         "parameter_ratio": model.n_parameters / best.n_parameters,
         "wavelets": model.n_wavelets,
         "understated": error > ALLOWED_RATIO * reported,

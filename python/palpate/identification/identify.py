@@ -19,9 +19,10 @@ from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.roles import Informative, role_counts, unused_rows
-from ..verdict import Verdict
+from ..verdict import Finding, Verdict
+from .classes.causes import first_strokes
 from .classes.class_selection import VELOCITY_INPUTS
-from .classes.findings import USABLE_NRMSE, verdict_of
+from .classes.findings import USABLE_NRMSE, drift_findings, judged_network, verdict_of
 from .classes.memory import better_with_memory
 from .data.period import period_of, revolution_of
 from .data.rows import require_in_range, rows_of
@@ -146,13 +147,13 @@ def identify(
     fitted, sections = in_sections(recordings)
     with one_thread():
         network = _identified(recordings, fitted, settings, object_of)
-        # Rows behind a turn with a small weight share an error: none of them is wrong alone.
-        counted = network.errors.weighted
-        if not sections and counted is not None and len(counted) == sum(map(len, fitted)):
-            residuals = np.split(counted, np.cumsum([len(each) for each in fitted])[:-1])
-            if informative.drop_wrong_readings(residuals):
-                fitted = recordings = informative.recordings
-                network = _identified(recordings, fitted, settings, object_of)
+        if not sections and _wrong_readings_dropped(network, informative):
+            fitted = recordings = informative.recordings
+            network = _identified(recordings, fitted, settings, object_of)
+        if not sections and (changed := _first_strokes_dropped(network, informative)):
+            fitted = recordings = informative.recordings
+            network = _identified(recordings, fitted, settings, object_of)
+            network = replace(network, log=Log(findings=changed) + network.log)
     rows = network.rows
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
@@ -170,6 +171,31 @@ def identify(
         on_it = rows.fitted & steepest.rows(rows.domain[:, 0], rows.direction)
         model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))
     return model
+
+
+def _wrong_readings_dropped(network: FittedNetwork, informative: Informative) -> bool:
+    """Drops rows whose residual is that of a wrong reading, and returns True if there are any."""
+    # Rows behind a turn with a small weight share an error: none of them is wrong alone.
+    counted = network.errors.weighted
+    if counted is None or len(counted) != sum(map(len, informative.recordings)):
+        return False
+    ends = np.cumsum([len(each) for each in informative.recordings])[:-1]
+    return informative.drop_wrong_readings(np.split(counted, ends))
+
+
+def _first_strokes_dropped(network: FittedNetwork, informative: Informative) -> list[Finding]:
+    """Drops the first strokes over their places if they differ perceptibly from the later ones, which show
+    what the object is from then on, and returns the finding on it."""
+    residual = network.errors.residual
+    whole = residual is not None and len(residual) == sum(map(len, informative.recordings))
+    if network.memory is not None or not whole:
+        return []
+    judged = judged_network(network, network.rows)
+    first = first_strokes(judged)
+    if not first.any():
+        return []
+    informative.drop_first_strokes(first)
+    return drift_findings(judged)
 
 
 def _identified(

@@ -53,6 +53,7 @@ DROPPED = {
     "repeated": "repeats of the previous reading",
     WRONG_READING: "wrong readings",
     "approach": "far from the contact",
+    "first stroke": "first strokes over their places, before the object changed",
 }
 """What the rows are that are dropped for a reason, for texts."""
 
@@ -170,6 +171,12 @@ class Informative:
             wrong = wrong_readings(path, position, force, recording.inputs.T, residual)
             self._drop(number, wrong, WRONG_READING)
         return self.dropped.get(WRONG_READING, 0) > before
+
+    def drop_first_strokes(self, first: NDArray[np.bool_]) -> None:
+        """Drops rows (n,) of all recordings at which a stroke passes a place for the first time."""
+        ends = np.cumsum([len(each) for each in self.recordings])[:-1]
+        for number, rows in enumerate(np.split(first, ends)):
+            self._drop(number, rows, "first stroke")
 
     def _drop(self, number: int, rows: NDArray[np.bool_], reason: str) -> None:
         """Drops rows (n,) of one recording."""

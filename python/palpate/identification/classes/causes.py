@@ -188,11 +188,7 @@ class _Strokes:
         of each row, the change of the value whose effect the sentence states, and the fitted functions."""
         data = self.best.data
         x = data.path[:, 0]
-        low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
-        revolution = np.rint(x - data.box[:, 0])[self.rows]
-        place = revolution * PLACES + self.group % PLACES  # wholly within the earlier strokes, or not
-        again = ((low * PLACES <= place) & (place + 1.0 <= high * PLACES)).astype(float)
-        yield FIRST, again, 1.0, [again]
+        yield FIRST, self.again, 1.0, [self.again]
         if data.parts:
             velocity, known = at_rows(data.parts, least_error_low_pass(data.parts, order=1), 1, len(x))
             time = np.concatenate([piece.row_time for piece in data.parts])
@@ -216,6 +212,15 @@ class _Strokes:
         yield LATER, middle, 1.0, [middle]
 
     @cached_property
+    def again(self) -> Float1D:
+        """(k,) 1 for a row at a place that is wholly within the earlier strokes, else 0"""
+        data = self.best.data
+        x = data.path[:, 0]
+        low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
+        place = np.rint(x - data.box[:, 0])[self.rows] * PLACES + self.group % PLACES
+        return ((low * PLACES <= place) & (place + 1.0 <= high * PLACES)).astype(float)
+
+    @cached_property
     def first(self) -> NDArray[np.intp]:
         """(m,) index of the first row of each passage"""
         return np.unique(self.passage, return_index=True)[1]
@@ -237,6 +242,18 @@ class _Strokes:
         root, stroke = np.sqrt(self.share), np.unique(self.number[self.first], return_inverse=True)[1]
         mean = np.bincount(stroke, root * weighted) / np.bincount(stroke, self.share)
         return weighted - root * mean[stroke]
+
+
+def first_strokes(best: Judged) -> NDArray[np.bool_]:
+    """Returns True for the rows (n,) at which a stroke is the first over its place and differs perceptibly
+    from a later one in the same direction; none if another cause explains the difference."""
+    first, cause = np.zeros(len(best.weight), dtype=bool), cause_of(best)
+    if cause is not None and cause.by == FIRST and cause.perceptible:
+        strokes = _Strokes.of(best)
+        assert strokes is not None
+        again = strokes.again > 0.0
+        first[strokes.rows[~again & np.isin(strokes.group, strokes.group[again])]] = True
+    return first
 
 
 def cause_of(best: Judged) -> Cause | None:

@@ -156,9 +156,10 @@ def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
 
 def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
     """Returns an identified network that has a residual on all rows."""
-    residual = network.errors.residual
+    residual, share = network.errors.residual, network.errors.share
     assert residual is not None
-    return Judged(rows, residual, rows.fitted.astype(float), rows.direction, _inputs(network))
+    weight = rows.fitted * (1.0 if share is None else share)
+    return Judged(rows, residual, weight, rows.direction, _inputs(network))
 
 
 def place_findings(best: Judged) -> list[Finding]:
@@ -355,8 +356,8 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
 
 
 def hidden_by_friction(best: Candidate, decisions: Sequence[Decision]) -> list[Decision]:
-    """Returns the decision that the faults are not tested which the rows do not distinguish from friction;
-    none without friction. `decisions` holds the other ones."""
+    """Returns the decision that the faults of a measurement are not tested which the rows do not distinguish
+    from friction; none without friction. `decisions` holds the other ones."""
     data = best.data
     if best.strokes is None or len(data.names) > 1:
         return []
@@ -364,13 +365,13 @@ def hidden_by_friction(best: Candidate, decisions: Sequence[Decision]) -> list[D
     one_speed = not data.parts or any(
         each.model_class == "damping" and each.outcome == "not tested" for each in decisions
     )
-    cures = {"backlash": "mount the object without backlash"}
+    cures = {"backlash": "mount the object without it"}
     if direction is None or turns_of(direction) < 2:
-        cures["moved zero"] = "press a second time"
+        cures["a moved zero"] = "press a second time"
     if one_speed:
-        cures["late force"] = "record the time, slow and fast strokes"
-    cure = f"the loop of friction hides it; {', '.join(cures.values())}"
-    return [Decision(", ".join(cures), "not tested", cure)]
+        cures["a late force"] = "record the time, slow and fast strokes"
+    cure = f"the loop of friction hides {', '.join(cures)}; {', '.join(cures.values())}"
+    return [Decision("measuring faults", "not tested", cure)]
 
 
 def _judged_error(best: Candidate, contact_share: float) -> RowError:

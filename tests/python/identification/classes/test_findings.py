@@ -171,9 +171,9 @@ def test_what_friction_can_hide_is_stated_not_to_be_tested(count: int, hidden: b
     x = np.tile(np.r_[np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)], count)
     force = 2.0 * x + 0.1 * np.repeat([1.0, -1.0] * count, 60)
     model = palpate.identify(palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x))))
-    (decision,) = (each for each in model.notes["model_selection"] if "friction hides it" in each)
-    names = ["backlash", *(["moved zero"] if hidden else []), "late force"]
-    assert decision.startswith(f"{', '.join(names)}: not tested")
+    (decision,) = (each for each in model.notes["model_selection"] if each.startswith("measuring faults"))
+    names = ["backlash", *(["a moved zero"] if hidden else []), "a late force"]
+    assert f": not tested (the loop of friction hides {', '.join(names)}; " in decision
 
 
 def conditioned(count: int, loss: float) -> palpate.Recording:
@@ -191,6 +191,25 @@ def test_a_first_press_that_differs_from_the_others_is_named(count: int) -> None
     named = "behind the first stroke over a position"
     assert named in str(palpate.identify(conditioned(count, 0.3)).verdict)
     assert palpate.identify(conditioned(count, 0.005)).verdict.level == "good"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_first_press_that_differs_is_not_fitted(sign: float) -> None:
+    """An object that softens is the same in all later strokes; a stroke with the wrong sign is not the
+    object's."""
+    recording = conditioned(3, 0.4)
+    first = np.arange(len(recording)) < 60
+    force = np.where(first, sign, 1.0) * recording.force
+    model = palpate.identify(palpate.Recording.from_arrays(recording.position, force, recording.time))
+    later = recording.position[~first], recording.force[~first]
+    error = (
+        model.force(later[0], direction=np.tile(np.repeat([-1.0, 1.0], 60), 3)[: len(later[0])]) - later[1]
+    )
+    assert np.std(error) < 0.02 * np.std(later[1])
+    assert any(
+        "60 of 360 rows dropped (first strokes over their places, " in each for each in model.notes["rows"]
+    )
+    assert model.verdict.reasons[0].startswith("behind the first stroke over a position")
 
 
 def test_strokes_that_differ_by_their_speed_are_not_only_called_a_changed_object() -> None:
