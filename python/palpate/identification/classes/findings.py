@@ -115,10 +115,7 @@ def wait_findings(best: Candidate, left: NDArray[np.bool_]) -> list[Finding]:
     if not len(unused) or best.error.spread == 0.0:
         return []
     box, force, band = data.box[unused], best.static_force[unused], noise_band(data.path[:, 0])
-    parts = [
-        (best.force_near(near), 0.0) if best.strokes is None else best.parts_at(near)
-        for near in (np.clip(box + shift, 0.0, 1.0) for shift in (0.0, -band, band))
-    ]
+    parts = [best.parts_at(near) for near in (np.clip(box + shift, 0.0, 1.0) for shift in (0.0, -band, band))]
     # At an end of the travel the force beyond is not known: it changes there as much as inside.
     (middle, half), (before, _), (behind, _) = parts
     around = np.abs(half) + np.maximum(np.abs(before - middle), np.abs(behind - middle))
@@ -216,10 +213,7 @@ def effect_of_shift(selection: ClassSelection) -> tuple[float, list[Finding], li
         return 0.0, [], []
     data, unit, weight = best.data, best.data.force_unit, best.settled.weight
     box, side = data.box, np.zeros(len(weight)) if best.strokes is None else best.strokes.side
-    (middle, half), (true_middle, true_half) = (
-        each.parts_at(box) if best.strokes is not None else (each.force_near(box), 0.0)
-        for each in (best, shift.without)
-    )
+    (middle, half), (true_middle, true_half) = (each.parts_at(box) for each in (best, shift.without))
     force = true_middle + side * true_half
     place = places_of(box, side)
     mean_apart, mean_force = means_at(place, weight, middle + side * half - force, force)

@@ -275,13 +275,11 @@ class Candidate:
         some rows."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
-    def force_near(self, positions: Float2D) -> Float1D:
-        """Returns the force (k,) of a candidate without hysteresis at positions (k, d) in the unit box."""
-        return self._force(positions, None)
-
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
         """Returns the mean force g (k,) of both strokes and the hysteresis h (k,) at positions (k, d) in the
-        unit box."""
+        unit box; h is 0 without hysteresis."""
+        if self.strokes is None:
+            return self._force(positions, None), np.zeros(len(positions))
         middle = self._force(positions, np.zeros(len(positions)))
         return middle, self._force(positions, np.ones(len(positions))) - middle
 

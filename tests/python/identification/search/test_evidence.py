@@ -8,7 +8,9 @@ import pytest
 
 from palpate import identify
 from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification.classes.model_selection import select
 from palpate.identification.data.compression import HeldOutRows, held_out_rows
+from palpate.identification.data.rows import Rows
 from palpate.identification.search.evidence import choice, enough, standard_error
 from palpate.recording import sample_recording
 
@@ -73,3 +75,12 @@ def test_decisions_report_the_criterion_of_each_model_class() -> None:
     reason = r"accepted \(lowers BIC by \d+\)"
     assert re.fullmatch(f"straight line: {reason}", straight)
     assert re.fullmatch(f"curve over position: {reason}", curve)
+
+
+def test_a_force_without_hysteresis_is_the_same_in_both_strokes() -> None:
+    position = np.linspace(0.0, 1.0, 50)
+    rows = Rows(("position",), position[:, None], 3.0 * position)
+    best = select(rows, IdentifyOptions()).best
+    middle, hysteresis = best.parts_at(position[:, None])
+    assert middle == pytest.approx(3.0 * position)
+    assert hysteresis == pytest.approx(np.zeros(50))
