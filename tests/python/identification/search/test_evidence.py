@@ -82,5 +82,5 @@ def test_a_force_without_hysteresis_is_the_same_in_both_strokes() -> None:
     rows = Rows(("position",), position[:, None], 3.0 * position)
     best = select(rows, IdentifyOptions()).best
     middle, hysteresis = best.parts_at(position[:, None])
-    assert middle == pytest.approx(3.0 * position)
+    assert middle == pytest.approx(3.0 * position, abs=1e-6)
     assert hysteresis == pytest.approx(np.zeros(50))
