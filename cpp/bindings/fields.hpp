@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -36,11 +35,11 @@ PythonType<V> to_python(const V& value) {
 }
 
 template <class T, std::size_t k>
-using FieldType = std::remove_cvref_t<decltype(std::get<k>(fields_of<T>).of(std::declval<T&>()))>;
+using FieldType = std::remove_cvref_t<decltype(fields_of<T>.template get<k>().of(std::declval<T&>()))>;
 
 template <class T, std::size_t k>
 void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
-    const auto& field = std::get<k>(fields_of<T>);
+    const auto& field = fields_of<T>.template get<k>();
     if constexpr (HasWords<FieldType<T, k>>) {
         field.of(object) = named<FieldType<T, k>>(value, field.name);
     } else {
@@ -51,7 +50,7 @@ void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
 /// Returns the Python keyword argument for a struct field. The first `required` fields of the struct have no default.
 template <class T, std::size_t k, std::size_t required>
 auto argument_of(const T& standard) {
-    const auto& field = std::get<k>(fields_of<T>);
+    const auto& field = fields_of<T>.template get<k>();
     if constexpr (k < required) {
         return pybind11::arg(field.name);
     } else {
@@ -76,7 +75,7 @@ void bind_fields(
     pybind11::class_<T>& type, bool with_repr = true,
     void (*check)(const std::type_identity_t<T>&) = [](const T&) {}) {
     namespace py = pybind11;
-    constexpr std::size_t n = std::tuple_size_v<std::remove_cvref_t<decltype(fields_of<T>)>>;
+    constexpr std::size_t n = fields_of<T>.size;
     const T standard{};
     [&]<std::size_t... k>(std::index_sequence<k...>) {
         type.def(py::init([check](PythonType<FieldType<T, k>>... value) {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -25,7 +24,7 @@ struct Motor {
 
 template <>
 inline constexpr auto fields_of<Motor> =
-    std::tuple{Field<&Motor::inertia>{"inertia", "[kg*m^2]", Rule::Positive},
+    FieldTable{Field<&Motor::inertia>{"inertia", "[kg*m^2]", Rule::Positive},
                Field<&Motor::time_constant_s>{"time_constant_s", "[s]", Rule::NotNegative}};
 
 namespace {
@@ -54,6 +53,15 @@ TEST(FieldTable, OptionalFieldIsCheckedOnlyIfItIsGiven) {
     } catch (const std::invalid_argument& error) {
         EXPECT_STREQ(error.what(), "motor: time_constant_s is -1, must be >= 0");
     }
+}
+
+TEST(FieldTable, SumOfTablesKeepsTheOrder) {
+    constexpr auto table = fields_of<Motor> + FieldTable{Field<&Motor::inertia>{"again"}};
+    static_assert(table.size == 3);
+    EXPECT_EQ(table.apply([](const auto&... field) { return (std::string{} + ... + field.name); }),
+              "inertiatime_constant_sagain");
+    Motor motor{5.0, {}};
+    EXPECT_EQ(table.get<2>().of(motor), 5.0);
 }
 
 TEST(FieldTable, OnlyOptionalFieldsMayBeMissingInAFile) {

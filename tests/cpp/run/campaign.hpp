@@ -19,7 +19,7 @@
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
-#include "palpate/run/render.hpp"
+#include "palpate/run/detail/render.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "simulation/scenes.hpp"

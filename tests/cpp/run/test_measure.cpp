@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/run/measure.hpp"
+#include "palpate/run/detail/measure.hpp"
 
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/run/render.hpp"
+#include "palpate/run/detail/render.hpp"
 
 #include <stdlib.h>
 #include <sys/resource.h>

@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <tuple>
 
 #include "palpate/fields/field_table.hpp"
 
@@ -41,7 +40,7 @@ struct OnDevice {
 };
 
 template <>
-inline constexpr auto fields_of<OnDevice> = std::tuple{
+inline constexpr auto fields_of<OnDevice> = FieldTable{
     Field<&OnDevice::delay_periods>{
         "delay_periods",
         "Time from a sample to the force computed from it, in periods of the controller [-].",
@@ -74,7 +73,7 @@ struct AdmittanceDisplay {
 };
 
 template <>
-inline constexpr auto fields_of<AdmittanceDisplay> = std::tuple{
+inline constexpr auto fields_of<AdmittanceDisplay> = FieldTable{
     Field<&AdmittanceDisplay::hand_stiffness>{
         "hand_stiffness", "k_h, largest stiffness of the hand or foot [N/m or N*m/rad].", Rule::NotNegative},
     Field<&AdmittanceDisplay::hand_damping>{
@@ -131,7 +130,7 @@ struct HeldLine {
 };
 
 template <>
-inline constexpr auto fields_of<HeldLine> = std::tuple{
+inline constexpr auto fields_of<HeldLine> = FieldTable{
     Field<&HeldLine::period_s>{"period_s", "Time between two samples of the controller [s].", Rule::Positive},
     Field<&HeldLine::delay_s>{
         "delay_s",
@@ -213,7 +212,7 @@ inline constexpr std::array<std::string_view, 1> renderers{"device"};
 }  // namespace detail
 
 template <>
-inline constexpr auto fields_of<DeviceProfile> = std::tuple{
+inline constexpr auto fields_of<DeviceProfile> = FieldTable{
     Field<&DeviceProfile::id>{"id",
                               "Name; a certificate holds for the device with this name and these numbers."},
     Field<&DeviceProfile::position_unit>{"position_unit",

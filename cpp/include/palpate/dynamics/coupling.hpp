@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <tuple>
-
 #include "palpate/fields/field_table.hpp"
 
 namespace palpate {
@@ -30,7 +28,7 @@ struct VirtualCoupling {
 
 template <>
 inline constexpr auto fields_of<VirtualCoupling> =
-    std::tuple{Field<&VirtualCoupling::stiffness>{
+    FieldTable{Field<&VirtualCoupling::stiffness>{
                    "stiffness", "K_c, stiffness of the coupling [N/m or N*m/rad].", Rule::Positive},
                Field<&VirtualCoupling::damping>{
                    "damping", "B_c, damping of the coupling [N*s/m or N*m*s/rad].", Rule::NotNegative}};
@@ -56,7 +54,7 @@ struct Inertia {
 
 template <>
 inline constexpr auto fields_of<Inertia> =
-    std::tuple{Field<&Inertia::mass>{"mass", "m, mass of the object [kg or kg*m^2].", Rule::Positive},
+    FieldTable{Field<&Inertia::mass>{"mass", "m, mass of the object [kg or kg*m^2].", Rule::Positive},
                Field<&Inertia::damping>{"damping", "B_o, damping of the object [N*s/m or N*m*s/rad].",
                                         Rule::NotNegative}};
 

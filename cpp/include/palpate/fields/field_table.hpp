@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #include "palpate/fields/readable.hpp"
 
@@ -56,11 +56,68 @@ template <auto outer, auto... path>
     return {name, field.doc, field.rule, field.stored, field.words};
 }
 
+namespace detail {
+
+/// Entry number k of a table of fields.
+template <std::size_t k, class F>
+struct TableEntry {
+    F field;
+};
+
+template <class Numbers, class... Fields>
+struct TableEntries;
+template <std::size_t... k, class... Fields>
+struct TableEntries<std::index_sequence<k...>, Fields...> : TableEntry<k, Fields>... {};
+
+template <std::size_t k, class F>
+[[nodiscard]] constexpr const F& entry(const TableEntry<k, F>& found) noexcept {
+    return found.field;
+}
+
+}  // namespace detail
+
+/// List of descriptions. A std::tuple of this size takes several times as long to compile.
+template <class... Fields>
+class FieldTable {
+  public:
+    static constexpr std::size_t size = sizeof...(Fields);
+
+    constexpr explicit FieldTable(Fields... fields) noexcept : entries_{{fields}...} {}
+
+    /// Returns description number k.
+    template <std::size_t k>
+    [[nodiscard]] constexpr const auto& get() const noexcept {
+        return detail::entry<k>(entries_);
+    }
+
+    /// Calls `visit` once, with all descriptions as its arguments, and returns the result.
+    template <class Visit>
+    constexpr auto apply(const Visit& visit) const {
+        return apply(visit, std::index_sequence_for<Fields...>{});
+    }
+
+  private:
+    template <class Visit, std::size_t... k>
+    constexpr auto apply(const Visit& visit, std::index_sequence<k...> /*numbers*/) const {
+        return visit(static_cast<const detail::TableEntry<k, Fields>&>(entries_).field...);
+    }
+
+    detail::TableEntries<std::index_sequence_for<Fields...>, Fields...> entries_;
+};
+
+/// Returns a table with the descriptions of both tables.
+template <class... First, class... Second>
+[[nodiscard]] constexpr auto operator+(const FieldTable<First...>& first,
+                                       const FieldTable<Second...>& second) noexcept {
+    return first.apply([&](const auto&... a) {
+        return second.apply([&](const auto&... b) { return FieldTable<First..., Second...>{a..., b...}; });
+    });
+}
+
 /// Returns the descriptions `fields` of a struct for a larger struct whose member `outer` is this struct.
 template <auto outer, class... Fields>
-[[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
-    return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
-                      fields);
+[[nodiscard]] constexpr auto all_within(const FieldTable<Fields...>& fields) noexcept {
+    return fields.apply([](const auto&... field) { return FieldTable{within<outer>(field, field.name)...}; });
 }
 
 /// True if the type V is std::optional. A file may omit a field of such a type.
@@ -69,7 +126,7 @@ inline constexpr bool is_optional = false;
 template <class V>
 inline constexpr bool is_optional<std::optional<V>> = true;
 
-/// Table of the fields of the struct S: a tuple of `Field`. Each struct with a table specialises this variable.
+/// Table of the fields of the struct S: a `FieldTable`. Each struct with a table specialises this variable.
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
@@ -80,7 +137,7 @@ concept HasFields = !std::is_null_pointer_v<std::remove_cv_t<decltype(fields_of<
 /// Calls `visit` with every field of a struct.
 template <HasFields S, class Visit>
 constexpr void for_each_field(Visit visit) {
-    std::apply([&](const auto&... field) { (visit(field), ...); }, fields_of<S>);
+    fields_of<S>.apply([&](const auto&... field) { (visit(field), ...); });
 }
 
 /// Names of the values of an enumeration as they appear in files and messages, in the order of the values. Each

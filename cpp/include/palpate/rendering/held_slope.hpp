@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
-#include <tuple>
 
 #include "palpate/fields/field_table.hpp"
 #include "palpate/model/force_model.hpp"
@@ -33,7 +32,7 @@ struct HeldSlope {
 };
 
 template <>
-inline constexpr auto fields_of<HeldSlope> = std::tuple{
+inline constexpr auto fields_of<HeldSlope> = FieldTable{
     Field<&HeldSlope::rule>{"rule", "Rule for the slope: steepest, raised or constant."},
     Field<&HeldSlope::slope>{
         "slope", "Largest slope of the line (steepest), or its slope (constant) [N/m or N*m/rad].",

@@ -7,7 +7,6 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 
 #include "palpate/fields/field_table.hpp"
 #include "palpate/model/parameters.hpp"
@@ -64,7 +63,7 @@ struct ProbeSettings {
 };
 
 template <>
-inline constexpr auto fields_of<ProbeSettings> = std::tuple{
+inline constexpr auto fields_of<ProbeSettings> = FieldTable{
     Field<&ProbeSettings::lower>{
         "lower", "Lowest position of the spring's target, where its motion reverses [m or rad].",
         Rule::Finite},

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <tuple>
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/model/force_model.hpp"
@@ -112,7 +111,7 @@ struct SchemeChoices {
 
 template <>
 inline constexpr auto fields_of<SchemeChoices> =
-    std::tuple{Field<&SchemeChoices::structure>{"structure"},
+    FieldTable{Field<&SchemeChoices::structure>{"structure"},
                Field<&SchemeChoices::compensated>{"compensated"},
                Field<&SchemeChoices::coupling_stiffness>{"coupling_stiffness"},
                Field<&SchemeChoices::coupling_damping>{"coupling_damping"},

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <tuple>
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/fields/field_table.hpp"
+#include "palpate/inline.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/held_slope.hpp"
 #include "palpate/rendering/structures.hpp"
@@ -27,12 +27,12 @@ struct Scheme {
 };
 
 template <>
-inline constexpr auto fields_of<Scheme> = std::tuple{
+inline constexpr auto fields_of<Scheme> = FieldTable{
     Field<&Scheme::structure>{"structure", "Connection of the model to the device."},
-    within<&Scheme::coupling>(std::get<0>(fields_of<VirtualCoupling>), "coupling_stiffness"),
-    within<&Scheme::coupling>(std::get<1>(fields_of<VirtualCoupling>), "coupling_damping"),
-    within<&Scheme::inertia>(std::get<0>(fields_of<Inertia>), "mass"),
-    within<&Scheme::inertia>(std::get<1>(fields_of<Inertia>), "object_damping"),
+    within<&Scheme::coupling>(fields_of<VirtualCoupling>.get<0>(), "coupling_stiffness"),
+    within<&Scheme::coupling>(fields_of<VirtualCoupling>.get<1>(), "coupling_damping"),
+    within<&Scheme::inertia>(fields_of<Inertia>.get<0>(), "mass"),
+    within<&Scheme::inertia>(fields_of<Inertia>.get<1>(), "object_damping"),
     Field<&Scheme::compensated>{
         "compensated",
         "True if the model is made stiffer, so that model and coupling in series give the recorded force."},
@@ -70,55 +70,7 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
 inline constexpr double compensated_share = 0.9;
 
 /// Checks that a scheme can render a model. Throws std::invalid_argument with the wrong field, its value and the rule.
-inline void validate(const Scheme& scheme, const ForceModel& model) {
-    const std::string structure{name_of(scheme.structure)};
-    const StructureTraits& traits = traits_of(scheme.structure);
-    require_renderable(model);
-    detail::require(
-        model.velocity() == nullptr || traits.velocity,
-        "structure is " + structure +
-            ", must be direct: only the direct structure can render a force of position and velocity");
-    detail::require(model.memory() == nullptr || scheme.structure == StructureKind::Direct,
-                    "structure is " + structure +
-                        ", must be direct: only the direct structure can render a force with memory");
-    if (traits.coupling && !is_uncoupled(scheme)) {
-        check_fields(scheme.coupling, "coupling_");
-    }
-    if (traits.mass) {
-        check_value(std::get<3>(fields_of<Scheme>), scheme.inertia.mass, "");
-        check_value(std::get<4>(fields_of<Scheme>), scheme.inertia.damping, "");
-    }
-    const std::string predict = "predict is " + std::to_string(scheme.predict);
-    detail::require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps,
-                    predict + ", must be 0 to 16");
-    detail::require(scheme.predict == 0 || traits.predicts,
-                    predict + ", must be 0 for the structure " + structure);
-    detail::require(scheme.predict == 0 || model.velocity() == nullptr,
-                    predict + ", must be 0 for a force of position and velocity");
-    detail::require(scheme.predict == 0 || model.memory() == nullptr,
-                    predict + ", must be 0 for a force with memory");
-    detail::require(satisfies(scheme.play_radius, Rule::NotNegative),
-                    "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
-    detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
-                    "play_radius is 0, but the model does not define one: must be > 0");
-    detail::require(traits.line || !scheme.line,
-                    "line is given, must be absent for the structure " + structure);
-    if (scheme.line) {
-        validate(*scheme.line, model);
-    }
-    if (scheme.compensated) {
-        detail::require(traits.coupling && !is_uncoupled(scheme),
-                        "compensated is set for the " + structure + " structure, which has no coupling");
-        detail::require(
-            !model.hysteresis(),
-            "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
-        const double steepest = std::max(model.network()->curve().slopes_everywhere().upper, 0.0);
-        detail::require(steepest <= compensated_share * scheme.coupling.stiffness,
-                        "coupling_stiffness is " + readable(scheme.coupling.stiffness) +
-                            ", must be at least " + readable(steepest / compensated_share) +
-                            " to compensate a model whose steepest slope is " + readable(steepest));
-    }
-}
+PALPATE_INLINE void validate(const Scheme& scheme, const ForceModel& model);
 
 /// Returns the largest slope of the force that a scheme renders for a model, at least 0 [N/m or N*m/rad]. After a
 /// reversal, the force of a hysteresis model changes from press to release over the play, which adds the slope h / r
@@ -155,3 +107,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
 }
 
 }  // namespace palpate
+
+#ifndef PALPATE_COMPILED
+#include "palpate/rendering/detail/validate.hpp"
+#endif

@@ -15,6 +15,7 @@
 #include "palpate/device/mit_device.hpp"
 #include "palpate/device/moteus_device.hpp"
 #include "palpate/fields/readable.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"

@@ -15,6 +15,7 @@
 
 #include "palpate/fields/readable.hpp"
 #include "palpate/fields/value.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"

@@ -13,6 +13,7 @@
 #include "palpate/device/wheel_device.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/model/derivatives.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"

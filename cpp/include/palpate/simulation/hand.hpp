@@ -4,7 +4,6 @@
 #include <cmath>
 #include <concepts>
 #include <numbers>
-#include <tuple>
 
 #include "palpate/fields/field_table.hpp"
 
@@ -66,7 +65,7 @@ static_assert(SimulatedHand<Hand>);
 
 template <>
 inline constexpr auto fields_of<Hand> =
-    std::tuple{Field<&Hand::stiffness>{"stiffness",
+    FieldTable{Field<&Hand::stiffness>{"stiffness",
                                        "Stiffness of the spring between target and handle [N/m or N*m/rad]."},
                Field<&Hand::damping>{"damping", "Damping between handle and ground [N*s/m or N*m*s/rad]."},
                Field<&Hand::lower>{"lower", "Smallest position of the spring's target [m or rad]."},

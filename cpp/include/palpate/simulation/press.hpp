@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <tuple>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
@@ -86,7 +85,7 @@ struct AccountUse {
 };
 
 template <>
-inline constexpr auto fields_of<AccountUse> = std::tuple{
+inline constexpr auto fields_of<AccountUse> = FieldTable{
     Field<&AccountUse::energy>{"energy", "E0, largest energy that a hand can take out [J]."},
     Field<&AccountUse::largest_speed>{"largest_speed",
                                       "Speed above which a reading ends the run [m/s or rad/s]."},
@@ -200,7 +199,7 @@ struct RestingOscillation {
 };
 
 template <>
-inline constexpr auto fields_of<RestingOscillation> = std::tuple{
+inline constexpr auto fields_of<RestingOscillation> = FieldTable{
     Field<&RestingOscillation::position>{"position", "Mean position of the handle [m or rad]."},
     Field<&RestingOscillation::amplitude>{
         "amplitude", "Half the distance between its reversals; 0: it comes to rest [m or rad]."},

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <tuple>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
@@ -38,7 +37,7 @@ struct TestRig {
 
 template <>
 inline constexpr auto fields_of<TestRig> =
-    std::tuple{Field<&TestRig::device>{"device"}, Field<&TestRig::hand>{"hand"},
+    FieldTable{Field<&TestRig::device>{"device"}, Field<&TestRig::hand>{"hand"},
                Field<&TestRig::scale, &ModelScale::length>{
                    "length", "Factor of positions, relative to those of the default knob [-]."},
                Field<&TestRig::scale, &ModelScale::force>{

@@ -8,7 +8,6 @@
 #include <limits>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -64,7 +63,7 @@ struct Certificate {
 };
 
 template <>
-inline constexpr auto fields_of<Certificate> = std::tuple{
+inline constexpr auto fields_of<Certificate> = FieldTable{
     Field<&Certificate::model>{"model", "Fingerprint of the model; empty if only bounds were certified."},
     Field<&Certificate::scheme>{"scheme", "Structure that renders the model, with its numbers."},
     Field<&Certificate::device>{"device", "Device for which the certificate holds."},

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include "palpate/fields/field_table.hpp"
@@ -69,7 +68,7 @@ struct ForceBounds {
 };
 
 template <>
-inline constexpr auto fields_of<ForceBounds> = std::tuple{
+inline constexpr auto fields_of<ForceBounds> = FieldTable{
     Field<&ForceBounds::slope, &Interval::lower>{
         "slope_min", "Smallest slope of the force [N/m]: min f', or min(g' - |h'|)."},
     Field<&ForceBounds::slope, &Interval::upper>{

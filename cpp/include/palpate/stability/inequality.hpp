@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <vector>
 
 #include "palpate/fields/field_table.hpp"
@@ -50,7 +49,7 @@ struct Inequality {
 
 template <>
 inline constexpr auto fields_of<Inequality> =
-    std::tuple{Field<&Inequality::id>{
+    FieldTable{Field<&Inequality::id>{
                    "id", "Name that never changes. A check of a certificate compares it, not the texts."},
                Field<&Inequality::left>{"left", "Left side of the inequality: the available value."},
                Field<&Inequality::right>{"right", "Right side of the inequality: the required value."},

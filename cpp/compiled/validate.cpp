@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/model/detail/validate.hpp"
+#include "palpate/rendering/detail/validate.hpp"
