@@ -255,12 +255,7 @@ RULES = (
     ),
     Rule("rows of a slower sensor", f"{CHECKS}.wrong_readings", "_rows_held", _one),
     Rule("residuals show wrong readings", "identification.identify", "Informative", OfForces),
-    Rule(
-        "first strokes that differ are not fitted",
-        "identification.identify",
-        "first_strokes",
-        lambda best: np.zeros(len(best.weight), dtype=bool),
-    ),
+    Rule("first strokes that differ are not fitted", "identification.identify", "first_strokes", _nothing),
     Rule("other strokes show errors of the model", f"{CHECKS}.wrong_readings", "_of_other_strokes", _zeros),
     Rule("waits are judged by time", "recording.conversion", "waits", lambda x, time=None: waits(x)),
     Rule("play follows over a gap", f"{DATA}.rows", "ordered_strokes", _nothing),

@@ -83,8 +83,8 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
         return identified(select(rows, options))
     found = identified(select(rows.only(side != 0), options))
     if found.weight_hysteresis is not None:
-        left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not fitted."
-        return replace(found, log=found.log + Log(rows=[left_out]))
+        found.log.rows.append(f"{np.count_nonzero(side == 0)} rows without a direction are not fitted.")
+        return found
     # hysteresis was refused, so rows without a direction need not be left out
     every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
     again = identified(select(every_row, options))

@@ -28,7 +28,6 @@ from .data.period import period_of, revolution_of
 from .data.rows import require_in_range, rows_of
 from .data.sections import in_sections
 from .fit import fit_rows
-from .log import Log
 from .network.fitted import FittedNetwork
 from .network.separable import TINY
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
@@ -147,17 +146,15 @@ def identify(
     fitted, sections = in_sections(recordings)
     with one_thread():
         network = _identified(recordings, fitted, settings, object_of)
-        if not sections and _wrong_readings_dropped(network, informative):
-            fitted = recordings = informative.recordings
-            network = _identified(recordings, fitted, settings, object_of)
-        if not sections and (changed := _first_strokes_dropped(network, informative)):
-            fitted = recordings = informative.recordings
-            network = _identified(recordings, fitted, settings, object_of)
-            network = replace(network, log=Log(findings=changed) + network.log)
+        for drop in () if sections else (_drop_wrong_readings, _drop_first_strokes):
+            if (findings := drop(network, informative)) is not None:
+                fitted = recordings = informative.recordings
+                network = _identified(recordings, fitted, settings, object_of)
+                network.log.findings[:0] = findings
     rows = network.rows
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
-    network = replace(network, log=Log(rows=[*informative.notes, *unused, *sections]) + network.log)
+    network.log.rows[:0] = [*informative.notes, *unused, *sections]
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     attracts = settings.below == "linear"
@@ -173,27 +170,26 @@ def identify(
     return model
 
 
-def _wrong_readings_dropped(network: FittedNetwork, informative: Informative) -> bool:
-    """Drops rows whose residual is that of a wrong reading, and returns True if there are any."""
+def _drop_wrong_readings(network: FittedNetwork, informative: Informative) -> list[Finding] | None:
+    """Drops rows whose residual is that of a wrong reading; returns None if there are none."""
     # Rows behind a turn with a small weight share an error: none of them is wrong alone.
     counted = network.errors.weighted
     if counted is None or len(counted) != sum(map(len, informative.recordings)):
-        return False
+        return None
     ends = np.cumsum([len(each) for each in informative.recordings])[:-1]
-    return informative.drop_wrong_readings(np.split(counted, ends))
+    return [] if informative.drop_wrong_readings(np.split(counted, ends)) else None
 
 
-def _first_strokes_dropped(network: FittedNetwork, informative: Informative) -> list[Finding]:
+def _drop_first_strokes(network: FittedNetwork, informative: Informative) -> list[Finding] | None:
     """Drops the first strokes over their places if they differ perceptibly from the later ones, which show
-    what the object is from then on, and returns the finding on it."""
+    what the object is from then on, and returns the finding on it; None if they do not differ."""
     residual = network.errors.residual
     whole = residual is not None and len(residual) == sum(map(len, informative.recordings))
     if network.memory is not None or not whole:
-        return []
+        return None
     judged = judged_network(network, network.rows)
-    first = first_strokes(judged)
-    if not first.any():
-        return []
+    if (first := first_strokes(judged)) is None:
+        return None
     informative.drop_first_strokes(first)
     return drift_findings(judged)
 
@@ -227,7 +223,7 @@ def _identified(
     if network.period is not None and searched:
         text = fitted[0].file_unit("position").text(network.period)
         note = f"The force repeats every {text}: positions are taken modulo this period (--period)."
-        network = replace(network, log=Log(notes=[note]) + network.log)
+        network.log.notes.insert(0, note)
     return better_with_memory(network, recordings, options)
 
 

@@ -132,18 +132,10 @@ def _short(value: float) -> str:
     return f"{abs(value):.0f}" if abs(value) >= _ROUNDED else f"{abs(value):.3g}"
 
 
-def squared_error_change(share: float, error: float, on: str) -> str:
-    """Returns the change of a squared error with its standard error, for messages.
-
-    Parameters
-    ----------
-    share : float
-        Relative decrease of the squared error [-].
-    error : float
-        Standard error of `share`.
-    on : str
-        Name of the rows on which the error was computed.
-    """
+def squared_error_change(share: float, error: float) -> str:
+    """Returns the relative decrease of the squared error on held-out sections, with the standard error of
+    this share, for messages."""
     if share < -1.0:
-        return f"raises the squared error on {on} to {_short(1.0 - share)} times"
-    return f"{_verb(share)} the squared error on {on} by {_short(100.0 * share)} +- {100.0 * error:.2g} %"
+        return f"raises the squared error on held-out sections to {_short(1.0 - share)} times"
+    size = f"{_short(100.0 * share)} +- {100.0 * error:.2g} %"
+    return f"{_verb(share)} the squared error on held-out sections by {size}"

@@ -99,6 +99,11 @@ class Judged:
     passive: bool = False
     """True if the hysteresis must not be below 0"""
 
+    @cached_property
+    def cause(self) -> Cause | None:
+        """Cause of what differs between strokes over the same place; None if no cause lowers BIC."""
+        return _cause_of(self)
+
     @property
     def floor(self) -> float:
         """Smallest just noticeable difference of the force of the rows [force]."""
@@ -244,20 +249,20 @@ class _Strokes:
         return weighted - root * mean[stroke]
 
 
-def first_strokes(best: Judged) -> NDArray[np.bool_]:
+def first_strokes(best: Judged) -> NDArray[np.bool_] | None:
     """Returns True for the rows (n,) at which a stroke is the first over its place and differs perceptibly
-    from a later one in the same direction; none if another cause explains the difference."""
-    first, cause = np.zeros(len(best.weight), dtype=bool), cause_of(best)
-    if cause is not None and cause.by == FIRST and cause.perceptible:
-        strokes = _Strokes.of(best)
-        assert strokes is not None
-        again = strokes.again > 0.0
-        first[strokes.rows[~again & np.isin(strokes.group, strokes.group[again])]] = True
+    from a later one in the same direction; None if another cause explains the difference."""
+    if best.cause is None or best.cause.by != FIRST or not best.cause.perceptible:
+        return None
+    strokes, first = _Strokes.of(best), np.zeros(len(best.weight), dtype=bool)
+    assert strokes is not None
+    again = strokes.again > 0.0
+    first[strokes.rows[~again & np.isin(strokes.group, strokes.group[again])]] = True
     return first
 
 
-def cause_of(best: Judged) -> Cause | None:
-    """Returns the cause of what differs between strokes over the same place; None if no cause lowers BIC.
+def _cause_of(best: Judged) -> Cause | None:
+    """Returns the cause of what differs between strokes over the same place.
 
     Causes that a hand notices are preferred. The one with the least BIC is taken, or an earlier one of the
     list if its BIC is higher by less than the evidence for a model class: two strokes show the same for most

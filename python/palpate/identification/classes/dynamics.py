@@ -245,7 +245,7 @@ class Dynamics:
             known = float(np.mean(self._derivatives[TERMS.index(name)][1]))  # other rows keep their error
             share, error = (known * each for each in regression.held_out_gain(use, without, with_it))
             found = regression.solved(use, with_it)[name]
-            measured = squared_error_change(share, error, "held-out sections")
+            measured = squared_error_change(share, error)
             if share - error >= LEAST_GAIN and found > 0.0:
                 decisions.append(decided(name, True, f"{measured}, {change}"))
                 continue

@@ -23,7 +23,7 @@ from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import Errors, FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
-from .causes import MOST_JND, PLACE_ERRORS, Judged, cause_of, means_at, places_of
+from .causes import MOST_JND, PLACE_ERRORS, Judged, means_at, places_of
 from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_residual
 from .shift import shift_of
@@ -270,8 +270,7 @@ def energy_findings(best: Candidate) -> list[Finding]:
 def drift_findings(best: Judged) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
     noticeable difference. One press and release cannot show this."""
-    cause = cause_of(best)
-    return [usable(cause.sentence)] if cause is not None and cause.perceptible else []
+    return [usable(best.cause.sentence)] if best.cause is not None and best.cause.perceptible else []
 
 
 def _floor(best: Candidate) -> float:

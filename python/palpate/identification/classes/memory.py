@@ -32,7 +32,8 @@ from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import deviance, on_fitted_rows
-from .causes import FIRST, LATER, cause_of
+from .causes import FIRST, LATER
+from .class_selection import VELOCITY_INPUTS
 from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
 from .memory_fit import CURVE_POINTS, STEPS, MemoryFit, Motion, Ranges, Resting, Shape
 
@@ -314,24 +315,25 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
     tested."""
     automatic = options.inputs == "auto" and found.period is None
     in_order = all(part.time is not None or _in_order(part) for part in recordings)
-    if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
+    if not (automatic and in_order) or found.inputs not in (("position",), VELOCITY_INPUTS):
         return ""
-    if not (automatic and in_order) or any(len(part.input_names) for part in recordings):
+    if any(len(part.input_names) for part in recordings):
         return ""
-    if "velocity" in found.inputs:
-        return _unsupported(options)
-    errors = found.errors
-    spread = errors.rmse / errors.nrmse if errors.nrmse else math.inf
-    if (nrmse := _rms_of_all(errors) / spread) < LEAST_NRMSE:
-        return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
-    every_second = 2 * errors.rows >= len(found.rows.force)
-    upper = errors.correlation + 2.0 / np.sqrt(max(errors.rows, 1))
-    if every_second and upper < LEAST_CORRELATION:
-        return (
-            "the error of the model without memory is noise: residuals of neighbouring rows have a "
-            f"correlation below {upper:.2g}, a memory needs {LEAST_CORRELATION:g}"
-        )
-    return _unsupported(options)
+    if found.inputs != VELOCITY_INPUTS:
+        errors = found.errors
+        spread = errors.rmse / errors.nrmse if errors.nrmse else math.inf
+        if (nrmse := _rms_of_all(errors) / spread) < LEAST_NRMSE:
+            return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
+        every_second = 2 * errors.rows >= len(found.rows.force)
+        upper = errors.correlation + 2.0 / np.sqrt(max(errors.rows, 1))
+        if every_second and upper < LEAST_CORRELATION:
+            return (
+                "the error of the model without memory is noise: residuals of neighbouring rows have a "
+                f"correlation below {upper:.2g}, a memory needs {LEAST_CORRELATION:g}"
+            )
+    if options.slope_limits is not None or options.fixed_force is not None:
+        return "constraints of the slope or of a force are not imposed on a memory"
+    return None
 
 
 def _in_order(recording: Recording) -> bool:
@@ -340,25 +342,20 @@ def _in_order(recording: Recording) -> bool:
     return states_its_order(recording) if stated else ordered_strokes(recording) is not None
 
 
-def _unsupported(options: IdentifyOptions) -> str | None:
-    """Returns the reason why the options exclude a memory; None if they do not."""
-    if options.slope_limits is not None or options.fixed_force is not None:
-        return "constraints of the slope or of a force are not imposed on a memory"
-    return None
-
-
 def better_with_memory(
     found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions
 ) -> FittedNetwork:
     """Returns the model with memory if the recordings support it, else the model found without memory."""
     reason = untested(found, recordings, options)
+    if reason:
+        found.log.decisions.append(Decision("memory", "not tested", reason))
     if reason is not None:
-        decision = Decision("memory", "not tested", reason)
-        return replace(found, log=found.log + Log(decisions=[decision])) if reason else found
+        return found
     tried = _with_memory(found, recordings, options)
-    if isinstance(tried, str):
-        return replace(found, log=found.log + Log(decisions=[decided("memory", False, tried)]))
-    return tried
+    if isinstance(tried, FittedNetwork):
+        return tried
+    found.log.decisions.append(decided("memory", False, tried))
+    return found
 
 
 def _with_memory(
@@ -455,7 +452,8 @@ def _with_memory(
     findings = drift_findings(judged) or place_findings(judged)
     if recorded.left and 2.0 * error**2 <= of_all**2 and (findings or nrmse > USABLE_NRMSE):
         findings = [_forgotten(recorded, of_all, error)]
-    return replace(network, log=network.log + Log(findings=findings))
+    network.log.findings.extend(findings)
+    return network
 
 
 def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
@@ -464,7 +462,7 @@ def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
     residual = found.errors.residual
     if residual is None or len(residual) != sum(map(len, recordings)):
         return 0.0
-    cause = cause_of(judged_network(found, found.rows))
+    cause = judged_network(found, found.rows).cause
     return cause.explained if cause is not None and cause.by in (FIRST, LATER) else 0.0
 
 
@@ -509,7 +507,7 @@ def _forgotten(recorded: Recorded, of_all: float, in_contact: float) -> Finding:
 
 
 def _gain_text(gain: float, error: float, moved: float) -> str:
-    change = squared_error_change(gain, error, "held-out sections")
+    change = squared_error_change(gain, error)
     compared = " compared with a zero or an object that changes" if moved else ""
     return f"{change}{compared}, must lower it by at least {100.0 * LEAST_GAIN:g} %"
 

@@ -21,7 +21,7 @@ from ..data.rows import Rows
 from ..log import Log, decided, in_words, lowered
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
-from .causes import FASTER, cause_of
+from .causes import FASTER
 from .class_selection import (
     REGROWTH_ERROR_RATIO,
     VELOCITY_INPUTS,
@@ -128,7 +128,7 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
         return below
     damped = moving is not None and moving.mass is None
     residual = below.static_force - below.force_at()
-    cause = cause_of(judged_candidate(below))
+    cause = judged_candidate(below).cause
     if cause is None or not (cause.by == FASTER and cause.perceptible and cause.share >= LEAST_GAIN):
         if not (damped or below.settled.nrmse > USABLE_NRMSE):
             return below

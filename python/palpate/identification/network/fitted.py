@@ -162,8 +162,7 @@ class FittedNetwork:
         log = replace(self.log, path=[replace(point, rmse=point.rmse / factor) for point in self.log.path])
         if scale.offset:
             offset = force_unit.text(scale.offset)
-            text = f"An offset of {offset} was subtracted from the recorded force for the fit."
-            log = Log(notes=[text]) + log
+            log.notes.insert(0, f"An offset of {offset} was subtracted from the recorded force for the fit.")
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor

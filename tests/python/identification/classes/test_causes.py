@@ -8,7 +8,7 @@ import pytest
 
 from imperfect import Array
 from palpate import Model, Recording, identify
-from palpate.identification.classes.causes import Judged, cause_of
+from palpate.identification.classes.causes import Judged
 from palpate.identification.classes.dynamics import LEAST_SPEED_SPREAD, spread_of_speeds
 from palpate.identification.classes.findings import drift_findings, place_findings
 from palpate.identification.data.rows import Rows
@@ -114,7 +114,7 @@ def test_the_rows_of_a_slow_stroke_at_a_place_count_once(seed: int) -> None:
     place = np.minimum((100 * x).astype(np.intp), 99)
     residual = 0.012 * random.normal(0.0, 1.0, (8, 100))[stroke, place]
     residual += random.normal(0.0, 0.002, len(x))
-    assert cause_of(judged(x, residual, 1.0 - 2.0 * (stroke % 2))) is None
+    assert judged(x, residual, 1.0 - 2.0 * (stroke % 2)).cause is None
 
 
 def test_strokes_that_differ_as_a_whole_have_a_cause() -> None:
@@ -122,7 +122,7 @@ def test_strokes_that_differ_as_a_whole_have_a_cause() -> None:
     x = np.tile(np.r_[np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)], 3)
     stroke = np.arange(len(x)) // 200
     residual = 0.05 * (stroke > 3) + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
-    cause = cause_of(judged(x, residual, 1.0 - 2.0 * (stroke % 2)))
+    cause = judged(x, residual, 1.0 - 2.0 * (stroke % 2)).cause
     assert cause is not None
     assert cause.perceptible
 

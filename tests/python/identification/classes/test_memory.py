@@ -455,7 +455,7 @@ def test_a_zero_that_drifts_is_not_a_branch_that_slips() -> None:
 
 
 def test_a_large_rise_of_the_error_is_stated_as_a_multiple() -> None:
-    text = squared_error_change(-569.79, 0.0, "held-out sections")
+    text = squared_error_change(-569.79, 0.0)
     assert text == "raises the squared error on held-out sections to 571 times"
 
 
