@@ -68,19 +68,10 @@ class Log:
     def __add__(self, other: Log) -> Log:
         return Log(*(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True)))
 
-    def follow(self, later: Log, notes: Iterable[str]) -> None:
-        """Adds notes and the log of a later model selection; only its findings hold."""
-        self.path += later.path
-        self.decisions += later.decisions
-        self.rows += later.rows
-        self.notes += [*notes, *later.notes]
-        self.findings = later.findings
-
-    def replaces(self, other: Log, note: str) -> None:
-        """Puts the tested networks of a replaced model selection, and the reason for its replacement, in
-        front."""
-        self.path[:0] = other.path
-        self.notes.insert(0, note)
+    def extend(self, later: Log) -> None:
+        """Adds the entries of a later stage."""
+        for mine, its in zip(vars(self).values(), vars(later).values(), strict=True):
+            mine.extend(its)
 
 
 def in_words(model_class: str) -> str:

@@ -209,7 +209,7 @@ def effect_of_shift(selection: ClassSelection) -> tuple[float, list[Finding], li
     less than the error on the rows.
     """
     best = selection.best
-    if (shift := shift_of(selection)) is None:
+    if (shift := selection.once(shift_of)) is None:
         return 0.0, [], []
     data, unit, weight = best.data, best.data.force_unit, best.settled.weight
     box, side = data.box, np.zeros(len(weight)) if best.strokes is None else best.strokes.side

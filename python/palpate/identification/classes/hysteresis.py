@@ -90,7 +90,8 @@ class Hysteresis:
     def better(self, below: Candidate) -> Candidate:
         selection, data = self._selection, self._selection.data
         if data.side is not None:
-            return self._chosen(below, self._free(below, HysteresisInput.of_strokes(data.side)))
+            known = np.ones(len(data.side), dtype=bool)
+            return self._chosen(below, self._free(below, HysteresisInput(data.side, known)))
         play, basis, best = PlaySearch(selection.samples, selection.options), below.solution.basis, None
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
             # The direction can also change at once at a turn. Wavelets of strokes without their reversals

@@ -35,7 +35,7 @@ from ..search.evidence import deviance, on_fitted_rows
 from .causes import FIRST, LATER
 from .class_selection import VELOCITY_INPUTS
 from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
-from .memory_fit import CURVE_POINTS, STEPS, MemoryFit, Motion, Ranges, Resting, Shape
+from .memory_fit import CURVE_POINTS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
@@ -111,8 +111,7 @@ def _grown(recorded: Recorded, options: IdentifyOptions, criterion: str, relaxes
             break
     if best.shape is None:
         return best
-    refined = best.fit.refined(best.shape, recorded.ranges, 3 * STEPS)
-    return replace(best, shape=refined.without_idle(best.fit.solved(refined)[1]))
+    return replace(best, shape=best.fit.finished(best.shape, recorded.ranges))
 
 
 def _larger(now: Choice, recorded: Recorded, relaxes: bool) -> Iterator[Choice]:
@@ -375,8 +374,7 @@ def _with_memory(
         return _gain_text(in_sample, 0.0, moved)
     at_rest = replace(recorded.at_rest(choice, options), below=recorded.below, above=recorded.above)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
-    shape = fit.refined(choice.shape, recorded.ranges, 3 * STEPS)
-    refined = shape.without_idle(fit.solved(shape)[1])
+    refined = fit.finished(choice.shape, recorded.ranges)
     if refined is None:
         return "no branch lowers the criterion"
     if len(refined.log_yield) == 1:

@@ -127,12 +127,6 @@ class Shape:
         ).T
         return low, high
 
-    def without_idle(self, stiffness: Float1D) -> Shape | None:
-        """Returns the shape without branches of stiffness 0; None if none is left."""
-        relaxing, slipping = np.split(stiffness > 0.0, [len(self.log_tau)])
-        left = replace(self, log_tau=self.log_tau[relaxing], log_yield=self.log_yield[slipping])
-        return left if left.n_branches else None
-
     @cached_property
     def ratio(self) -> Ratio:
         """Network of the ratio over the unit box as arguments of :class:`ForceModel`; its least value is
@@ -263,6 +257,13 @@ class MemoryFit:
         )
         better = shape.at(found.x)
         return better if self.rss(better) < self.rss(shape) else shape
+
+    def finished(self, shape: Shape, ranges: Ranges) -> Shape | None:
+        """Returns the shape refined by more steps, without branches of stiffness 0; None if none is left."""
+        shape = self.refined(shape, ranges, 3 * STEPS)
+        relaxing, slipping = np.split(self.solved(shape)[1] > 0.0, [len(shape.log_tau)])
+        left = replace(shape, log_tau=shape.log_tau[relaxing], log_yield=shape.log_yield[slipping])
+        return left if left.n_branches else None
 
     def rss(self, shape: Shape | None) -> float:
         """Returns the residual sum of squares; without branches for None."""

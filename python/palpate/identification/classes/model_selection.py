@@ -72,7 +72,8 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
             break
         repeated = current.repeated(replace(current.data, limits=replace(limits, independent=share)))
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
-        repeated.log.replaces(current.log, note)
+        repeated.log.path[:0] = current.log.path
+        repeated.log.notes.insert(0, note)
         current = repeated
     return min(found, key=lambda each: each[0])[1]
 
@@ -109,11 +110,13 @@ def mass_and_damping(selection: ClassSelection, below: Candidate) -> Candidate:
             moving=moving,
         )
     selection.log.decisions.extend(decisions)
-    selection.log.findings.extend(findings if not selection.log.findings else [])
     if found is below:
+        selection.log.findings = selection.log.findings or findings
         return below
     note = f"The model was selected again after the force of {' and '.join(values)} was subtracted."
-    selection.log.follow(replace(log, findings=findings or log.findings), [note])
+    selection.log.notes.append(note)
+    selection.log.extend(log)
+    selection.log.findings = findings or log.findings
     return selection.recorded(found)
 
 
@@ -155,7 +158,7 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
     after = float(below.fit_weight[rows] @ both.best.residual**2)
     constant = moving is not None and moving.damping is not None
     compared = "constant damping" if constant else in_words(below.model_class)
-    if shift := shift_of(selection):
+    if shift := selection.once(shift_of):
         # A network that is grown without the shift explains as much as the velocity of a late force.
         moved = shift.without
         grown = selection.growth.grow(moved.problem, moved.solution.basis, below.model_class)
@@ -170,9 +173,8 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
         log.path += both.log.path
         log.decisions.append(decision)
         return below
-    over_both_inputs = [f"Over position and velocity: {each}." for each in both.log.decisions]
-    findings = [*log.findings, *both.log.findings]
-    log.follow(replace(both.log, decisions=[decision], findings=findings), over_both_inputs)
+    log.notes += [f"Over position and velocity: {each}." for each in both.log.decisions]
+    log.extend(replace(both.log, decisions=[decision]))
     return both.best
 
 

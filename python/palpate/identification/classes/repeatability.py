@@ -36,7 +36,9 @@ def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, 
     if repeats is None:
         return None, ()
     used = best.error.weight > 0.0
-    band = None if _pure_error(best, repeats) is None else _band(best, best.residual, used, repeats)
+    side = None if best.side is None else best.side[used]
+    shared = pure_error(best.data.domain[used, 0], side, best.residual[used], repeats.recording[used])
+    band = None if shared is None else _band(best, best.residual, used, repeats)
     squares, rows, within, judged = 0.0, 0, 0, 0
     group, data = repeats.groups, best.data
     force, compressor = best.static_force, _compressor(selection, data.weight)
@@ -99,12 +101,6 @@ def _compressor(selection: ClassSelection, weight: Float1D | None) -> Compressor
     return Compressor(
         data.box, selection.best.static_force, weight=weight, max_positions=cells, limits=data.limits
     )
-
-
-def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
-    rows, data = best.error.weight > 0.0, best.data
-    side = None if best.side is None else best.side[rows]
-    return pure_error(data.domain[rows, 0], side, best.residual[rows], repeats.recording[rows])
 
 
 def _band(best: Candidate, residual: Float1D, rows: NDArray[np.bool_], repeats: Repeats) -> Band | None:

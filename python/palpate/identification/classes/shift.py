@@ -58,10 +58,6 @@ def shift_of(selection: ClassSelection) -> Shift | None:
     to it, the wavelets of the model are refined on moved rows. The shift must explain a quarter of the
     squared error that is not noise, as velocity must.
     """
-    return selection.once(_shift_of)
-
-
-def _shift_of(selection: ClassSelection) -> Shift | None:
     best, options = selection.best, selection.options
     data = best.data
     side = data.direction
@@ -80,37 +76,41 @@ def _shift_of(selection: ClassSelection) -> Shift | None:
         return position
 
     def refined(position: Float1D, strokes: HysteresisInput | None) -> tuple[SeparableProblem, Solution]:
-        """Returns the refined wavelets for other positions (n,) of the rows."""
+        """Returns the refined wavelets for positions (n,) of the rows."""
         ends = data.lower, data.lower + data.reach
         rows = replace(data, positions=position[:, None], corners=ends, weight=weight)
         problem = Samples(rows, options).problem(strokes)
         return problem, selection.growth.refined(problem, best.solution.basis)
 
-    def at(position: Float1D) -> Candidate:
-        """Returns the model for other positions (n,) of the rows."""
-        problem, found = refined(position, best.strokes)
-        return replace(best, problem=problem, solution=impose(problem, found, selection.bounds(problem)))
+    def constrained(problem: SeparableProblem, free: Solution) -> Candidate:
+        return replace(best, problem=problem, solution=impose(problem, free, selection.bounds(problem)))
 
-    unmoved = at(data.positions[:, 0])
-    problem, free = refined(data.positions[:, 0], best.strokes or HysteresisInput(side, known))
-    constrained = criterion_of(unmoved.problem, unmoved.solution, "bic")
-    if criterion_of(problem, free, "bic") + options.search.evidence > constrained:
+    def at(amount: float, late: bool) -> Candidate:
+        """Returns the model without a shift of the rows."""
+        return constrained(*refined(moved(amount, late), best.strokes))
+
+    problem, free = refined(data.positions[:, 0], best.strokes)
+    unmoved = constrained(problem, free)
+    if best.strokes is None:
+        problem, free = refined(data.positions[:, 0], HysteresisInput(side, known))
+    allowed = criterion_of(unmoved.problem, unmoved.solution, "bic") - options.search.evidence
+    if criterion_of(problem, free, "bic") > allowed:
         return None
     explained = unmoved.rmse**2 - problem.rmse(free) ** 2
     between = replace(best.error, residual=selection.once(left_out_residual))
     if explained < between.rmse**2 - best.error.rmse**2:
         return None  # rows that are far apart explain as much
     amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]
-    near, late = min(amounts, key=lambda each: at(moved(*each)).rmse)
+    near, late = min(amounts, key=lambda each: at(*each).rmse)
     amount = 2.0 ** float(
         scipy.optimize.minimize_scalar(
-            lambda power: at(moved(2.0**power, late)).rmse,
+            lambda power: at(2.0**power, late).rmse,
             bounds=(math.log2(near) - 0.5, math.log2(near) + 0.5),
             method="bounded",
             options={"maxiter": REFINEMENTS},
         ).x
     )
-    without = at(moved(amount, late))
+    without = at(amount, late)
     structured = max(unmoved.rmse**2 - noise_of(data.force) ** 2, 0.0)
     if unmoved.rmse**2 - without.rmse**2 < max(0.5 * explained, LEAST_GAIN * structured):
         return None

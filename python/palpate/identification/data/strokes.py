@@ -350,11 +350,6 @@ class HysteresisInput:
         return bool((side > 0.0).any() and (side < 0.0).any())
 
     @classmethod
-    def of_strokes(cls, side: Float1D) -> HysteresisInput:
-        """Returns the direction states of rows with known directions (n,), +1 or -1."""
-        return cls(side, np.ones(len(side), dtype=bool))
-
-    @classmethod
     def of_play(cls, motions: Sequence[Float1D], radius: float) -> HysteresisInput:
         """Returns the direction states of the play operator along motions that each start at s = 0.
 
