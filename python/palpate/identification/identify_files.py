@@ -227,13 +227,7 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
 
 
 def require_all_rows(recording: LongRecording, read: PartRead) -> None:
-    """Checks that the numbers of used rows and of left out rows add up to all rows of the file.
-
-    Raises
-    ------
-    InputError
-        The numbers of rows differ.
-    """
+    """Refuses a file whose numbers of used rows and of left out rows do not add up to all its rows."""
     used = 0 if read.summary is None else round(read.summary.rows)
     if not used + read.left_out.rows == read.rows == recording.rows:
         raise InputError(
@@ -265,8 +259,7 @@ def _identified(
         log.notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
     log.notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
-    if settings.inputs == "auto" and all(recording.has_time for recording in recordings):
-        log.decisions += [Decision(in_words(name), "not tested", IN_PARTS) for name in UNTESTED]
+    untested = []
     if all(recording.direction is None for recording in recordings):
         if settings.inputs != "auto" and "hysteresis" not in settings.inputs:
             side = None
@@ -274,9 +267,12 @@ def _identified(
             log.notes.append("The direction is taken from the order of rows, block by block.")
         else:
             side = None
-            log.decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
-            untested = f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"
-            log.findings.append(usable(untested))
+            untested.append(Decision("hysteresis", "not tested", UNKNOWN_STROKES))
+            log.findings.append(
+                usable(f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}")
+            )
+    if settings.inputs == "auto" and all(recording.has_time for recording in recordings):
+        untested += [Decision(in_words(name), "not tested", IN_PARTS) for name in UNTESTED]
     with one_thread():
         rows = Rows(
             ("position",),
@@ -297,7 +293,7 @@ def _identified(
     network = replace(
         network,
         errors=replace(errors, rmse=rmse, nrmse=nrmse, settled_nrmse=(nrmse, errors.left_out_nrmse)),
-        log=replace(log, decisions=[]) + network.log + Log(decisions=log.decisions),
+        log=log + network.log + Log(decisions=untested),
     )
     if settings.period is None:
         network = replace(network, lower=np.array([summary.lower]), upper=np.array([summary.upper]))
@@ -398,15 +394,18 @@ def summarise(
 
 def merged(first: Summary, second: Summary, most_cells: int = MOST_CELLS) -> Summary:
     """Returns one summary for the rows of two summaries."""
+    parts = (first, second)
     lower, upper = min(first.lower, second.lower), max(first.upper, second.upper)
-    levels = [summary.level for summary in (first, second) if summary.level is not None]
-    both = _joined(first, second, max(levels) if levels else None, lower, upper)
-    if both.level is None and len(np.unique(both.cell)) > most_cells:
-        both = _joined(first, second, _level_for(lower, upper, most_cells), lower, upper)
-    # the cell width fits the whole range of positions, not only cells with rows: later rows may fill gaps
-    if both.level is not None and (needed := _level_for(lower, upper, most_cells)) > both.level:
-        both = _joined(first, second, needed, lower, upper)
-    return both
+    levels = [part.level for part in parts if part.level is not None]
+    level = None
+    if levels or len(np.union1d(first.cell, second.cell)) > most_cells:
+        # the cell width fits the whole range of positions, not only cells with rows: later rows may fill gaps
+        level = max([*levels, _level_for(lower, upper, most_cells)])
+    cell = np.concatenate([_at_level(part, level) for part in parts])
+    side = np.concatenate([part.side for part in parts])
+    names = ("count", "position", "force", "xx", "xy", "yy")
+    columns = np.array([np.concatenate([getattr(part, name) for part in parts]) for name in names])
+    return _grouped(level, cell, side, columns, lower, upper)
 
 
 def _level_for(lower: float, upper: float, most_cells: int) -> int:
@@ -415,22 +414,11 @@ def _level_for(lower: float, upper: float, most_cells: int) -> int:
     return math.ceil(math.log2(max(upper - lower, np.finfo(float).tiny) / most_cells))
 
 
-def _joined(first: Summary, second: Summary, level: int | None, lower: float, upper: float) -> Summary:
-    parts = (first, second)
-    cell = np.concatenate([_at_level(part, level) for part in parts])
-    side = np.concatenate([part.side for part in parts])
-    names = ("count", "position", "force", "xx", "xy", "yy")
-    columns = np.array([np.concatenate([getattr(part, name) for part in parts]) for name in names])
-    return _grouped(level, cell, side, columns, lower, upper)
-
-
 def _at_level(summary: Summary, level: int | None) -> Float1D:
     """Returns the numbers of the cells of the summary at a level with the same or wider cells."""
     if level is None:
         return summary.cell
-    if summary.level is None:
-        return np.asarray(np.floor(np.ldexp(summary.cell, -level)))
-    return np.asarray(np.floor(np.ldexp(summary.cell, summary.level - level)))
+    return np.asarray(np.floor(np.ldexp(summary.cell, (summary.level or 0) - level)))
 
 
 def _grouped(
