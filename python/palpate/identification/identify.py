@@ -228,13 +228,7 @@ def _identified(
 
 
 def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
-    """Returns the recordings of each object.
-
-    Raises
-    ------
-    InputError
-        It is not a list of lists of recordings.
-    """
+    """Returns the recordings of each object; refuses all but a list of lists of recordings."""
     if not isinstance(objects, (list, tuple)) or not objects:
         raise InputError(
             f"objects is {shown(objects)}: must be a list with a list of recordings of each object"

@@ -211,13 +211,7 @@ _LOWER_BOUND = {
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:
-    """Checks the values of settings that are words, True or False, or numbers.
-
-    Raises
-    ------
-    InputError
-        Naming the field, its value and the cure.
-    """
+    """Checks the values of settings that are words, True or False, or numbers."""
     for each in fields(options):
         name, value = each.name, getattr(options, each.name)
         if name in CHOICES:
@@ -234,13 +228,7 @@ def _require(options: IdentifyOptions | SearchOptions) -> None:
 
 
 def _parsed(name: str, text: str) -> Any:
-    """Returns the value of a search setting from its text.
-
-    Raises
-    ------
-    InputError
-        The setting is unknown, or the text has the wrong type.
-    """
+    """Returns the value of a search setting from its text; refuses an unknown setting or a wrong type."""
     known = {each.name: each.default for each in fields(SearchOptions)}
     if name not in known:
         cure = did_you_mean(name, known) or f"; its settings are {', '.join(known)}"

@@ -14,7 +14,7 @@ from ...recording import Recording
 from ...recording.checks import findings_of
 from ...recording.motion import noise_band, strokes_from_order, turns_of
 from ...recording.roles import counts_text, role_counts
-from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
+from ...verdict import Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
 from ..data.strokes import weights_of_shared_errors
@@ -217,7 +217,7 @@ def effect_of_shift(selection: ClassSelection) -> tuple[float, list[Finding], li
     force = true_middle + side * true_half
     place = places_of(box, side)
     mean_apart, mean_force = means_at(place, weight, middle + side * half - force, force)
-    worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, _floor(best) or 1.0)))
+    worst = float(np.max(np.abs(mean_apart) / force_jnd(mean_force, judged_candidate(best).floor or 1.0)))
     rms = float(np.sqrt(np.mean(mean_apart[np.unique(place[weight > 0.0])] ** 2)))
     spread, explained = best.error.spread or 1.0, 2.0 * shift.without.rmse**2 <= shift.before**2
     perceptible = max(rms, best.settled.rmse * explained) > USABLE_NRMSE * spread or worst > MOST_JND
@@ -251,7 +251,7 @@ def energy_findings(best: Candidate) -> list[Finding]:
     loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
     place = places_of(data.box[rows][known], None)
     mean, force = means_at(place, np.ones(len(place)), loop, data.force[rows][known])
-    gained = -mean / force_jnd(force, _floor(best) or 1.0)
+    gained = -mean / force_jnd(force, judged_candidate(best).floor or 1.0)
     worst = int(np.argmax(gained))
     if gained[worst] <= MOST_JND:
         return []
@@ -271,11 +271,6 @@ def drift_findings(best: Judged) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
     noticeable difference. One press and release cannot show this."""
     return [usable(best.cause.sentence)] if best.cause is not None and best.cause.perceptible else []
-
-
-def _floor(best: Candidate) -> float:
-    """Returns the smallest just noticeable difference of the force of the rows [force]."""
-    return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
 def _outside(best: Candidate, options: IdentifyOptions, into: float) -> tuple[str, float]:
@@ -326,7 +321,7 @@ def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
     way = np.linspace(0.0, reached, COMPARED_POSITIONS)
     middle, half = best.parts_at((way if into > 0.0 else 1.0 - way)[:, None])
     least, most = into * middle - np.abs(half), into * middle + np.abs(half)
-    if least.min() >= -_floor(best):
+    if least.min() >= -judged_candidate(best).floor:
         return 0.0
     end = min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)
     return float(way[end]) if most[end] <= max(best.rmse, near_zero) else 0.0
@@ -338,7 +333,8 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
-    if best.error.rmse <= _floor(best) and not place_findings(judged_candidate(best)):
+    judged = judged_candidate(best)
+    if best.error.rmse <= judged.floor and not place_findings(judged):
         return []
     return [
         usable(

@@ -59,23 +59,17 @@ REWEIGHTINGS = 5
 
 def hysteresis(selection: ClassSelection, below: Candidate) -> Candidate:
     """Fits the model class hysteresis, if the options allow it and the rows have directions or the starts of
-    motions.
-
-    Raises
-    ------
-    InputError
-        The inputs name hysteresis, and the rows have neither.
-    """
+    motions; refuses options that name it and rows that have neither."""
     inputs, data = selection.options.inputs, selection.data
-    has_direction = data.side is not None or (data.starts is not None and len(data.names) == 1)
-    if not has_direction and "hysteresis" in inputs:
+    if data.side is not None or (data.starts is not None and len(data.names) == 1):
+        allowed = inputs == "auto" or "hysteresis" in inputs
+        return Hysteresis(selection).better(below) if allowed else below
+    if "hysteresis" in inputs:
         raise InputError(
             "inputs names hysteresis: the recording needs time, or both directions in a direction "
             "column; name that column, or remove hysteresis from inputs"
         )
-    if not has_direction or not (inputs == "auto" or "hysteresis" in inputs):
-        return below
-    return Hysteresis(selection).better(below)
+    return below
 
 
 class Hysteresis:

@@ -33,13 +33,7 @@ force: the square of such a value does not overflow."""
 
 
 def require_in_range(name: str, values: Float1D) -> None:
-    """Refuses values (n,), n >= 1, whose squares would overflow.
-
-    Raises
-    ------
-    InputError
-        A value is too large; the message names the largest value and the limit.
-    """
+    """Refuses values (n,), n >= 1, whose squares would overflow."""
     if (largest := float(np.abs(values).max())) > LARGEST_MAGNITUDE:
         raise InputError(
             f"{name} reaches {largest:.3g}: must be at most {LARGEST_MAGNITUDE:g}. Use another unit"
@@ -205,14 +199,7 @@ class Rows:
 
 
 def require_usable(rows: Rows, options: IdentifyOptions) -> None:
-    """Refuses data that cannot be identified.
-
-    Raises
-    ------
-    InputError
-        A shape is wrong, there are too few rows or distinct positions, a value is not finite, too large or
-        too small, an input is constant, or an option requires a single input.
-    """
+    """Refuses data that cannot be identified, and options that need position as the only input."""
     names, positions, force = rows.names, rows.positions, rows.force
     if positions.ndim != 2 or force.shape != (len(positions),):
         raise InputError(
@@ -266,11 +253,6 @@ def rows_of(
     """Returns the rows of recordings with the inputs that the options require.
 
     `objects` holds the number of the object of each recording; by default all are of one object.
-
-    Raises
-    ------
-    InputError
-        A recording has no such input, or the inputs are hysteresis together with further inputs.
     """
     names = _input_names(recordings[0], options)
     found = input_columns(recordings, names)
@@ -378,11 +360,6 @@ def input_columns(
     """Returns the named inputs (n, d) of each recording, and True (n,) for the rows that have all inputs.
 
     A velocity that is not a column of the recording is derived from its time.
-
-    Raises
-    ------
-    InputError
-        A recording does not have a named input.
     """
     moving = [(np.empty(0), np.ones(len(each), dtype=np.bool_)) for each in recordings]
     if "velocity" in names and not all("velocity" in each.input_names for each in recordings):

@@ -102,11 +102,6 @@ def criterion_of(
     """Returns the value of a criterion for a solution; a smaller value is better.
 
     By default n_parameters is the number of fitted values of the problem with the wavelets of the solution.
-
-    Raises
-    ------
-    InputError
-        The criterion needs held-out rows, and the problem has none.
     """
     if name in ON_HELD_OUT_ROWS:
         rows = problem.held_out
