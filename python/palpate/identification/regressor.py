@@ -187,29 +187,11 @@ def fit_regression(
 
     The model classes are constant, linear and network. A criterion that uses the fitted rows compares them on
     n samples, where n is the sum of the weights of the used rows. A model class with n or more parameters is
-    not tried.
+    not tried. Each row represents `weight` (n,) samples, by default 1.
 
-    Parameters
-    ----------
-    X : (n, d)
-        Finite numbers.
-    y : (n,)
-        Finite numbers.
-    weight : (n,), optional
-        Number of samples that each row represents, >= 0; by default 1. A row of weight 0 is left out.
-    options : IdentifyOptions
-
-    Returns
-    -------
-    (columns, network)
-        Indices of the columns of X that are inputs of the network, and the network. Constant columns are left
-        out; if all are constant, the first one is the input. The domain of the network is wider than the
-        range of the rows by the distance of :func:`_margin`.
-
-    Raises
-    ------
-    palpate.InputError
-        No row has a weight above 0, a value is too large, or there are too few rows to hold out.
+    Returns the indices of the columns of X that are inputs of the network, and the network. Constant columns
+    are left out; if all are constant, the first one is the input. The domain of the network is wider than the
+    range of the rows by the distance of :func:`_margin`.
     """
     if weight is None:
         weight = np.ones(len(y))

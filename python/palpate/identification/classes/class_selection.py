@@ -51,15 +51,8 @@ NETWORK_CLASSES = {("position",): "position", VELOCITY_INPUTS: "velocity"}
 
 
 class ClassSelection:
-    """One model selection over the rows of one recording, and the best candidate so far.
-
-    Parameters
-    ----------
-    data : Rows
-    options : IdentifyOptions
-    classes : sequence of ModelClass
-        Model classes in the order in which they are tried, the simplest first.
-    """
+    """One model selection over the rows of one recording, which tries the model classes in their order, the
+    simplest first; and the best candidate so far."""
 
     def __init__(self, data: Rows, options: IdentifyOptions, classes: Sequence[ModelClass]) -> None:
         self.data, self.options, self.classes = data, options, classes

@@ -59,27 +59,24 @@ class FoldedRegression:
     def __init__(
         self, table: Float2D, folds: Float1D, independent: float, two_sided: bool, least: float
     ) -> None:
-        self._independent, self._least = independent, least
+        self._independent, self._least, self._rows = independent, least, len(table)
         self._grams = np.array([table[folds == fold].T @ table[folds == fold] for fold in range(FOLDS)])
-        self._rows = np.bincount(folds.astype(np.int64), minlength=FOLDS)
-        n_static = table.shape[1] - 3
-        self._single = n_static // 2 if two_sided else n_static
-        self._n_static = n_static
+        self._total, n_static = self._grams.sum(axis=0), table.shape[1] - 3
+        self._static = {True: n_static, False: n_static // (1 + two_sided)}
 
     def value(self, two_sided: bool, names: Sequence[str], criterion: str) -> float:
         """Returns the criterion of the force regression with these terms (mass, damping), with or without
         hysteresis."""
         columns = self._columns(two_sided, names)
-        gram = self._grams.sum(axis=0)
-        rss = _rss(gram, columns, self._solution(gram, columns))
-        share = max(rss / self._rows.sum(), self._least, TINY)
+        rss = _rss(self._total, columns, _solution(self._total, columns))
+        share = max(rss / self._rows, self._least, TINY)
         p = min(len(columns), int(self._independent) - 2)
         return deviance(criterion, self._independent * share, self._independent, p)
 
     def solved(self, two_sided: bool, names: Sequence[str]) -> dict[str, float]:
         """Returns the fitted values of the named terms, mass or damping."""
-        columns = self._columns(two_sided, names)
-        return dict(zip(names, self._solution(self._grams.sum(axis=0), columns).tolist(), strict=False))
+        found = _solution(self._total, self._columns(two_sided, names))
+        return dict(zip(names, found.tolist(), strict=False))
 
     def held_out_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
@@ -97,19 +94,17 @@ class FoldedRegression:
         return float(1.0 - after / before), float(scatter.std(ddof=1) / before / np.sqrt(FOLDS))
 
     def _left_out(self, fold: int, columns: list[int]) -> float:
-        kept = self._grams.sum(axis=0) - self._grams[fold]
-        return _rss(self._grams[fold], columns, self._solution(kept, columns))
+        return _rss(self._grams[fold], columns, _solution(self._total - self._grams[fold], columns))
 
     def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
         """Returns the indices of columns of the least-squares table. Its columns are force, velocity,
         acceleration, basis functions of the force over position, and these functions times the direction
         state s."""
-        static = self._n_static if two_sided else self._single
-        return [1 + TERMS.index(name) for name in names] + list(range(3, 3 + static))
+        return [*(1 + TERMS.index(name) for name in names), *range(3, 3 + self._static[two_sided])]
 
-    @staticmethod
-    def _solution(gram: Float2D, columns: list[int]) -> Float1D:
-        return solved(factored(gram[np.ix_(columns, columns)]), gram[columns, 0])
+
+def _solution(gram: Float2D, columns: list[int]) -> Float1D:
+    return solved(factored(gram[np.ix_(columns, columns)]), gram[columns, 0])
 
 
 def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
@@ -163,14 +158,7 @@ def friction_sign(velocity: Float1D) -> Float1D:
 
 
 class Dynamics:
-    """Motion of a recording, from which mass and damping of the object are found.
-
-    Parameters
-    ----------
-    data : Rows
-        Rows of the recording, with the continuous motions between gaps of time.
-    options : IdentifyOptions
-    """
+    """Motion of a recording, from which mass and damping of the object are found."""
 
     def __init__(self, data: Rows, options: IdentifyOptions) -> None:
         parts = data.parts
@@ -201,13 +189,6 @@ class Dynamics:
         and a finding on a value below zero that a hand notices.
 
         No passive object has such a value, but a late force F(t - t0) = F - t0 dF/dt shows one.
-
-        Parameters
-        ----------
-        basis : Basis
-            Wavelets in the unit box.
-        strokes : HysteresisInput, optional
-            Direction state and weight of each row; None without hysteresis.
         """
         regression = self._regression(basis, strokes)
         if regression is None:

@@ -260,14 +260,7 @@ class Hysteresis:
 
 
 class PlaySearch:
-    """Searches the play radius that fits the motions of a recording best.
-
-    Parameters
-    ----------
-    samples : Samples
-        Rows of one position, with the starts of all motions.
-    options : IdentifyOptions
-    """
+    """Searches the play radius that fits the motions of a recording over one position best."""
 
     def __init__(self, samples: Samples, options: IdentifyOptions) -> None:
         data = samples.data

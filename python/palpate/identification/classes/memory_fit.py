@@ -168,18 +168,11 @@ Resting = Callable[[Float1D], Float2D]
 
 
 class MemoryFit:
-    """Least-squares fits of memories to rows in contact, with fixed columns for the force at rest.
+    """Least-squares fits of memories to rows in contact, with fixed columns `resting` for the force at rest.
 
-    Parameters
-    ----------
-    motions : sequence of Motion
-    resting : function
-        Columns of the force at rest. A small weight on its curvature decides where the rows do not: the ramps
-        of a relaxation test determine only the sum of the force at rest and of the branches.
-    least : float
-        Smallest mean squared error that the force sensor resolves.
-    rms : float
-        Expected RMS error, which determines the weight of the curvature.
+    A small weight on the curvature of this force decides where the rows do not: the ramps of a relaxation
+    test determine only the sum of the force at rest and of the branches. The weight depends on the expected
+    error `rms`. No force sensor resolves a mean squared error below `least`.
     """
 
     def __init__(

@@ -71,20 +71,9 @@ class Compressed:
 class Compressor:
     """Groups the rows of a recording by position, and compresses them with or without a direction state.
 
-    Parameters
-    ----------
-    positions : (n, d)
-    force : (n,)
-    max_positions : int
-        Largest number of distinct positions; with more, positions are gathered in this number of cells of a
-        regular grid.
-    weight : (n,), optional
-        Number of samples that each row represents, >= 0; by default 1. A row of weight 0 is left out.
-    within : float
-        Sum of squared differences of the samples from the force of their row, if a row represents several
-        samples.
-    limits : RowLimits
-        Limits of the information in the samples.
+    More than `max_positions` distinct positions (n, d) are gathered in this number of cells of a regular
+    grid. Each row represents `weight` (n,) samples, by default 1; one of weight 0 is left out. The sum of
+    squared differences of the samples from the force of their row is `within`.
     """
 
     def __init__(
@@ -261,11 +250,8 @@ class HeldOutRows:
     def in_jnd(self, errors: Float1D) -> Float1D:
         """Returns errors (k,) in just noticeable differences: 7 % of the local force, at least 1 % of the
         largest force."""
-        return np.asarray(errors / force_jnd(self.force, self._floor))
-
-    @property
-    def _floor(self) -> float:
-        return float(FORCE_FLOOR * np.abs(self.force).max()) or 1.0
+        floor = float(FORCE_FLOOR * np.abs(self.force).max()) or 1.0
+        return np.asarray(errors / force_jnd(self.force, floor))
 
 
 def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:

@@ -79,21 +79,11 @@ LEAST_EQUAL_REPEATS = 0.99
 
 
 def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Finds the distinct rows of a table, as np.unique(table, axis=0), but ten times faster by sorting the
-    columns.
+    """Finds the distinct rows of a table (n, d), in sorted order.
 
-    Parameters
-    ----------
-    table : (n, d)
-
-    Returns
-    -------
-    chosen : (k,) int
-        Index of one row for each distinct row, in sorted order.
-    group : (n,) int
-        Number of the distinct row that equals each row of the table.
-    count : (k,) int
-        Number of rows of the table that equal each distinct row.
+    Returns the index of one row for each of them (k,), the number of the one that equals each row (n,), and
+    the number of rows that equal each of them (k,).
+    It sorts the columns, which is ten times faster than np.unique(table, axis=0).
     """
     order = np.lexsort(table.T[::-1])
     ordered = table[order]

@@ -77,14 +77,8 @@ def deviations(
     """Returns the difference (n,) of each row from the mean of the recordings of its object at its position;
     NaN where no other recording has rows.
 
-    Parameters
-    ----------
-    position, residual : (n,)
-        Rows of all recordings. Residuals of a model change little between neighbouring positions.
-    side : (n,), optional
-        Direction of each row; rows of different directions are not compared.
-    recording, object_of : (n,)
-        Number of the recording and of the object of each row.
+    Rows of different directions are not compared. Residuals of a model change little between neighbouring
+    positions.
     """
     strokes = np.zeros(len(position)) if side is None else np.sign(side)
     found = np.full(len(position), np.nan)
@@ -121,20 +115,8 @@ def band_of(
     """Returns the band of a further recording, without its check; None if no part of the travel has rows of
     two recordings, or of two objects if there are several.
 
-    Each recording counts once, with few rows or many.
-
-    Parameters
-    ----------
-    position, residual : (n,)
-        Rows in recorded order, and the residual of the model.
-    side : (n,), optional
-        Direction of each row.
-    repeats : Repeats
-        Recording and object of each row.
-    ends : (float, float)
-        Smallest and largest position of the domain.
-    force_range : float
-        Largest minus smallest force; the band is at least as wide as the resolution of the force.
+    Each recording counts once, with few rows or many. The rows are in recorded order, and `ends` are those of
+    the domain. The band is at least as wide as the resolution of the force, a share of `force_range`.
     """
     lower, width = ends[0], (ends[1] - ends[0]) / BAND_PARTS
     part = np.clip(((position - lower) / width).astype(np.intp), 0, BAND_PARTS - 1)
@@ -172,18 +154,8 @@ def _mean_squares(values: Float1D, group: NDArray[np.intp], rows: NDArray[np.boo
 def _half_width(squares: Float1D, count: float, freedom: int, noise: float, rows: NDArray[np.bool_]) -> float:
     """Returns the half width of a band for a further member of a group.
 
-    Parameters
-    ----------
-    squares : (members,)
-        Mean squared difference of each member from the mean.
-    count : float
-        Number of members that have this mean.
-    freedom : int
-        Degrees of freedom of the differences.
-    noise : float
-        Variance of the difference from row to row.
-    rows : (n,)
-        True for the rows of all members.
+    The mean of `count` members, from which each differs by a mean square (members,), leaves `freedom` degrees
+    of freedom. `noise` is the variance of the difference from row to row of all `rows` (n,).
     """
     square, level = float(squares.mean()), 0.5 + 0.5 * BAND_LEVEL
     noise = min(noise, square)

@@ -247,11 +247,7 @@ def settled_rows(path: Float1D, order: Float1D, distance: float) -> NDArray[np.b
 
 
 def weights_behind_turns(
-    path: Float1D,
-    order: Float1D,
-    residual: Float1D,
-    touched: NDArray[np.bool_],
-    least: float,
+    path: Float1D, order: Float1D, residual: Float1D, touched: NDArray[np.bool_], least: float
 ) -> Float1D:
     """Returns the weight (n,) of each row in a fit, from 0 to 1.
 
@@ -262,18 +258,8 @@ def weights_behind_turns(
     other stroke and have the same positions. A tool that leaves the object at one end shows walls and clicks
     near the other one, so that only rows next to its turns are weighted.
 
-    Parameters
-    ----------
-    path : (n,) array
-        Positions in recorded order [travel].
-    order : (n,) array
-        Direction of each row from the order of rows; 0 for rows of no stroke.
-    residual : (n,) array
-        Force of the rows minus that of a model [force].
-    touched : (n,) array
-        True for rows in contact.
-    least : float
-        Smallest error that the force sensor resolves [force], above 0.
+    The positions `path` are in recorded order [travel], and `order` is 0 for rows of no stroke. `touched` is
+    True in contact. The force sensor resolves no error below `least` > 0 [force].
     """
     (moving, stroke, begins), weight = turns_before(order), np.ones(len(path))
     if not len(moving):

@@ -327,13 +327,7 @@ class Candidate:
 
 
 class Samples:
-    """Rows of one recording: compressed rows for the fit, and held-out rows for the comparison of models.
-
-    Parameters
-    ----------
-    data : Rows
-    options : IdentifyOptions
-    """
+    """Rows of one recording: compressed rows for the fit, and held-out rows for the comparison of models."""
 
     def __init__(self, data: Rows, options: IdentifyOptions) -> None:
         self.data, self._held_out = data, data.held_out()
@@ -397,14 +391,7 @@ def local_noise_ratio(below: Candidate, above: Candidate) -> float:
 
 
 class Judge:
-    """Decides which of two candidates is accepted, by the criterion.
-
-    Parameters
-    ----------
-    options : IdentifyOptions
-    log : Log
-        Receives the decisions of `better`.
-    """
+    """Decides which of two candidates is accepted, by the criterion."""
 
     def __init__(self, options: IdentifyOptions, log: Log) -> None:
         self.criterion, self.evidence, self._log = options.criterion, options.search.evidence, log

@@ -116,12 +116,8 @@ class Grown:
 class Growth:
     """Grows networks by the search settings of an identification.
 
-    Parameters
-    ----------
-    options : IdentifyOptions
-    single : bool
-        True if the force is known to be single-valued. Otherwise press and release, sampled at different
-        positions, can look like one force that needs ever more wavelets.
+    `single` is True if the force is known to be single-valued. Otherwise press and release, sampled at
+    different positions, can look like one force that needs ever more wavelets.
     """
 
     def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
