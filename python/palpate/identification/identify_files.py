@@ -466,40 +466,23 @@ def in_order(
     scheduler: str | None = None,
     done: Callable[[int], None] = lambda count: None,
 ) -> Iterator[Result]:
-    """Yields work(item) of every item, in the order of items.
+    """Yields work(item) of every item, in the order of items, and calls `done` with the number of finished
+    items after each.
 
-    Parameters
-    ----------
-    work : callable
-        Function of an item. Its result must depend on the item alone, so that it does not depend on the
-        worker.
-    items : sequence
-        Sent to the workers.
-    jobs : int
-        Processes of this machine, through joblib; 1: this process.
-    scheduler : str, optional
-        Address of a Dask scheduler, such as "tcp://host:8786": joblib hands the same work to it. Work that a
-        lost worker had is done again by another.
-    done : callable
-        Receives the number of finished items after each item.
-
-    Raises
-    ------
-    InputError
-        joblib or Dask is not installed, or no scheduler answers there.
+    joblib starts `jobs` processes of this machine; with 1 this process works. With the address of a Dask
+    `scheduler`, such as "tcp://host:8786", joblib sends the same work to it. Work that a lost worker had is
+    done again by another. So that a result does not depend on the worker, it must depend on the item alone.
     """
-    if scheduler is None and jobs == 1:
-        for count, item in enumerate(items, start=1):
-            yield work(item)
-            done(count)
-        return
-    joblib = _needed("joblib")
     with ExitStack() as stack:
-        if scheduler is not None:
-            client = stack.enter_context(_client(scheduler))
-            stack.enter_context(joblib.parallel_config(backend="dask", client=client))
-        parallel = joblib.Parallel(n_jobs=-1 if scheduler else jobs, return_as="generator")
-        for count, result in enumerate(parallel(joblib.delayed(work)(item) for item in items), start=1):
+        results: Iterator[Result] = map(work, items)
+        if scheduler is not None or jobs != 1:
+            joblib = _needed("joblib")
+            if scheduler is not None:
+                client = stack.enter_context(_client(scheduler))
+                stack.enter_context(joblib.parallel_config(backend="dask", client=client))
+            parallel = joblib.Parallel(n_jobs=-1 if scheduler else jobs, return_as="generator")
+            results = parallel(joblib.delayed(work)(item) for item in items)
+        for count, result in enumerate(results, start=1):
             yield result
             done(count)
 
