@@ -173,8 +173,8 @@ def identify(
 def _drop_wrong_readings(network: FittedNetwork, informative: Informative) -> list[Finding] | None:
     """Drops rows whose residual is that of a wrong reading; returns None if there are none."""
     # Rows behind a turn with a small weight share an error: none of them is wrong alone.
-    counted = network.errors.weighted
-    if counted is None or len(counted) != sum(map(len, informative.recordings)):
+    counted = network.errors.share * network.errors.residual
+    if len(counted) != sum(map(len, informative.recordings)):
         return None
     ends = np.cumsum([len(each) for each in informative.recordings])[:-1]
     return [] if informative.drop_wrong_readings(np.split(counted, ends)) else None
@@ -183,8 +183,7 @@ def _drop_wrong_readings(network: FittedNetwork, informative: Informative) -> li
 def _drop_first_strokes(network: FittedNetwork, informative: Informative) -> list[Finding] | None:
     """Drops the first strokes over their places if they differ perceptibly from the later ones, which show
     what the object is from then on, and returns the finding on it; None if they do not differ."""
-    residual = network.errors.residual
-    whole = residual is not None and len(residual) == sum(map(len, informative.recordings))
+    whole = len(network.errors.residual) == sum(map(len, informative.recordings))
     if network.memory is not None or not whole:
         return None
     judged = judged_network(network, network.rows)

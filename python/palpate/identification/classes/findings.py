@@ -153,10 +153,8 @@ def judged_candidate(best: Candidate, passive: bool = False) -> Judged:
 
 def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
     """Returns an identified network that has a residual on all rows."""
-    residual, share = network.errors.residual, network.errors.share
-    assert residual is not None
-    weight = rows.fitted * (1.0 if share is None else share)
-    return Judged(rows, residual, weight, rows.direction, _inputs(network))
+    weight = rows.fitted * network.errors.share
+    return Judged(rows, network.errors.residual, weight, rows.direction, _inputs(network))
 
 
 def place_findings(best: Judged) -> list[Finding]:

@@ -321,7 +321,7 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
     if found.inputs != VELOCITY_INPUTS:
         errors = found.errors
         spread = errors.rmse / errors.nrmse if errors.nrmse else math.inf
-        if (nrmse := _rms_of_all(errors) / spread) < LEAST_NRMSE:
+        if (nrmse := _rms(errors.residual, errors.share) / spread) < LEAST_NRMSE:
             return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
         every_second = 2 * errors.rows >= len(found.rows.force)
         upper = errors.correlation + 2.0 / np.sqrt(max(errors.rows, 1))
@@ -436,7 +436,14 @@ def _with_memory(
         model_class="memory",
         n_parameters=n_parameters,
         errors=Errors(
-            of_all, nrmse, left_out_nrmse, (nrmse, left_out_nrmse), of_all, len(of_rows), residual=of_rows
+            of_all,
+            nrmse,
+            left_out_nrmse,
+            settled_nrmse=(nrmse, left_out_nrmse),
+            settled_rmse=of_all,
+            rows=len(of_rows),
+            residual=of_rows,
+            share=np.ones(len(of_rows)),
         ),
         log=Log(
             found.log.path + network.log.path,
@@ -457,8 +464,7 @@ def _with_memory(
 def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
     """Returns the mean square of the force [force^2] that a zero or an object that changes explains of the
     residual without memory, as branches can: a memory must explain more. 0 if nothing changes."""
-    residual = found.errors.residual
-    if residual is None or len(residual) != sum(map(len, recordings)):
+    if len(found.errors.residual) != sum(map(len, recordings)):
         return 0.0
     cause = judged_network(found, found.rows).cause
     return cause.explained if cause is not None and cause.by in (FIRST, LATER) else 0.0
@@ -539,10 +545,10 @@ class _Compared:
             speed, known = (recorded.fitted(list(each)) for each in zip(*velocities(parts), strict=True))
             share, outside = known.astype(float), np.zeros(len(force))
             residual = force - found.force(np.column_stack([position, speed]), None)
-        elif errors.residual is None or errors.share is None or len(errors.residual) != ends[-1]:
+        elif len(errors.residual) != ends[-1]:
             # some rows have no residual, such as those at gaps of time
             whole = np.array(1.0)
-            return cls(balance, whole, whole, _rms_of_all(errors), errors.settled_rmse)
+            return cls(balance, whole, whole, _rms(errors.residual, errors.share), errors.settled_rmse)
         else:
             residual, share = (
                 recorded.fitted(np.split(each, ends[:-1])) for each in (errors.residual, errors.share)
@@ -554,12 +560,6 @@ class _Compared:
         return cls(
             balance, share, sure, _rms(residual, share), _rms(np.where(moving, residual, outside), sure)
         )
-
-
-def _rms_of_all(errors: Errors) -> float:
-    """Returns the RMS error on every row, also on those that are not fitted [force]."""
-    assert errors.residual is not None
-    return _rms(errors.residual, np.array(1.0) if errors.share is None else errors.share)
 
 
 def _rms(residual: Float1D, weight: NDArray[Any]) -> float:

@@ -38,21 +38,15 @@ class Errors:
     """Number of fitted rows"""
     correlation: float = 0.0
     """Correlation of the residuals of neighbouring rows in recorded order [-]"""
-    residual: Float1D | None = None
-    """(n,) force of each row minus that of the network [force]"""
-    share: Float1D | None = None
-    """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted; None: 1 each"""
-
-    @property
-    def weighted(self) -> Float1D | None:
-        """(n,) residual of each row times its weight [force]; None without residuals."""
-        return self.residual if self.residual is None or self.share is None else self.share * self.residual
+    residual: Float1D = field(default_factory=lambda: np.zeros(0))
+    """(n,) force of each row minus that of the network [force]; empty if not computed"""
+    share: Float1D = field(default_factory=lambda: np.zeros(0))
+    """(n,) weight of each row in the fit, from 0 to 1, and 1 for rows that are not fitted"""
 
     def unscaled(self, factor: float) -> Errors:
         """Returns the errors of forces that are divided by a factor."""
-        residual = None if self.residual is None else self.residual / factor
         rmse, settled_rmse = self.rmse / factor, self.settled_rmse / factor
-        return replace(self, rmse=rmse, settled_rmse=settled_rmse, residual=residual)
+        return replace(self, rmse=rmse, settled_rmse=settled_rmse, residual=self.residual / factor)
 
 
 @dataclass(frozen=True)
