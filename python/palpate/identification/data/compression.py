@@ -98,30 +98,21 @@ class Compressor:
         self._force = force[self.kept]
         self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
 
-    def samples(self, only: NDArray[np.bool_] | None = None) -> float:
-        """Returns the number of recorded rows that all used rows, or those selected by `only` (n,),
-        represent."""
-        return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
+    def samples(self, only: NDArray[np.bool_]) -> float:
+        """Returns the number of recorded rows that the used ones among the rows `only` (n,) represent."""
+        return float(self._weight[only[self.kept]].sum())
 
     def rows(self, side: Float1D | None = None, share: NDArray[Any] | None = None) -> Compressed:
         """Returns compressed rows; rows in different cells of the direction state `side` (n,) are not merged.
 
         `share` (n,) from 0 to 1 multiplies the weights of the rows of the recording.
         """
-        cell, positions, force, weight, within = (
-            self._key,
-            self._positions,
-            self._force,
-            self._weight,
-            self._within,
-        )
-        side = None if side is None else side[self.kept]
-        if share is not None:
-            here = share[self.kept]
-            on = here > 0
-            cell, positions, force, weight = cell[on], positions[on], force[on], weight[on] * here[on]
-            side = None if side is None else side[on]
-            within *= float(weight.sum() / self._weight.sum())
+        here = np.ones(len(self.kept)) if share is None else share[self.kept]
+        on = here > 0
+        cell, positions, force, weight = self._key[on], self._positions[on], self._force[on], self._weight[on]
+        weight = weight * here[on]
+        side = None if side is None else side[self.kept][on]
+        within = self._within * float(weight.sum() / self._weight.sum())
         key = cell
         if side is not None:
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)

@@ -46,12 +46,6 @@ class Basis:
         return Basis(np.zeros((0, dimension)), np.zeros((0, dimension)))
 
     @staticmethod
-    def unused(count: int, dimension: int) -> "Basis":
-        """Returns wavelets that use no input."""
-        shape = (count, dimension)
-        return Basis(np.full(shape, UNUSED_DILATION), np.full(shape, UNUSED_TRANSLATION))
-
-    @staticmethod
     def of_orders(orders: Float1D) -> "Basis":
         """Returns a cosine and a sine of each order, the number of waves in the unit box (k,)."""
         wave = np.repeat(orders, 2)
@@ -90,7 +84,8 @@ class Basis:
     def over(self, inputs: Sequence[int], dimension: int) -> "Basis":
         """Returns these wavelets of some inputs as wavelets of `dimension` inputs, which do not use the
         others."""
-        found = Basis.unused(len(self), dimension)
+        shape = (len(self), dimension)
+        found = Basis(np.full(shape, UNUSED_DILATION), np.full(shape, UNUSED_TRANSLATION))
         found.alpha[:, inputs], found.beta[:, inputs] = self.alpha, self.beta
         return found
 

@@ -350,12 +350,11 @@ class Samples:
         Rows with unknown direction state are dropped and the remaining rows reweighted to the same total, so
         that all model classes are compared on the same number of samples.
         """
-        only = ~self._held_out if self._for_criterion else None
+        only = ~self._held_out if self._for_criterion else np.ones(len(self.data.force), dtype=bool)
         if strokes is None:
             rows = self._compressor.rows(share=only)
         else:
-            share = strokes.share if only is None else only * strokes.share
-            rows = self._compressor.rows(strokes.side, share)
+            rows = self._compressor.rows(strokes.side, only * strokes.share)
             rows = rows.reweighted_to(self._compressor.samples(only))
         return rows if self.data.period is None else around_seam(rows)
 
