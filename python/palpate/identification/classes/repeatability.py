@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -39,12 +39,10 @@ def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, 
     side = None if best.side is None else best.side[used]
     shared = pure_error(best.data.domain[used, 0], side, best.residual[used], repeats.recording[used])
     band = None if shared is None else _band(best, best.residual, used, repeats)
-    squares, rows, within, judged = 0.0, 0, 0, 0
-    group, data = repeats.groups, best.data
-    force, compressor = best.static_force, _compressor(selection, data.weight)
-    for number in np.unique(group[used]) if band is not None else ():
-        others = used & (group != number)
-        residual, left = _left_out(best, compressor, force, others, used & (group == number))
+    if band is None:
+        return None, (NO_BAND,)
+    squares, rows, within, judged, data = 0.0, 0, 0, 0, best.data
+    for residual, others, left in _left_out(selection, data.weight, repeats.groups, SeparableProblem.solve):
         squares += float(residual[left] @ residual[left])
         rows += int(np.count_nonzero(left))
         of_others = _band(best, residual, others, repeats)
@@ -52,7 +50,7 @@ def band_with_check(selection: ClassSelection) -> tuple[Band | None, tuple[str, 
             half = of_others.half_width(data.domain[left, 0])
             within += int(np.count_nonzero(np.abs(residual[left]) <= half))
             judged += len(half)
-    if band is None or rows == 0:
+    if rows == 0:
         return None, (NO_BAND,)
     coverage = within / judged if judged else None
     band = replace(band, unseen_error=float(np.sqrt(squares / rows)), coverage=coverage)
@@ -75,32 +73,19 @@ def left_out_residual(selection: ClassSelection) -> Float1D:
     direction: a row whose position is known from another stroke does not test the force between rows.
     """
     best = selection.best
-    data, used = best.data, best.error.weight > 0.0
-    force, compressor = best.static_force, _compressor(selection, best.fit_weight)
-    rows = np.flatnonzero(used)
+    data, rows = best.data, np.flatnonzero(best.error.weight > 0.0)
     together = max(1, round(len(rows) / best.problem.independent))
     place = [np.rint(column / resolution_of(column)) for column in data.box[rows].T]
     first, at_place, _ = distinct_rows(
         np.column_stack(place if best.side is None else [*place, np.sign(best.side[rows])])
     )
-    fold = np.full(len(used), -1)
+    fold = np.full(len(data.force), -1)
     fold[rows] = (first // together % HELD_OUT_EVERY)[at_place]
     residual = best.error.residual.copy()
     fit: Fit = selection.growth.refined if len(data.names) == 1 else SeparableProblem.solve
-    for number in range(HELD_OUT_EVERY):
-        again, left = _left_out(
-            best, compressor, force, used & (fold != number), used & (fold == number), fit
-        )
+    for again, _, left in _left_out(selection, best.fit_weight, fold, fit):
         residual[left] = again[left]
     return residual
-
-
-def _compressor(selection: ClassSelection, weight: Float1D | None) -> Compressor:
-    """Returns the rows of the best candidate with weights (n,), without the forces of mass and damping."""
-    data, cells = selection.best.data, selection.options.search.cells(len(selection.best.data.names))
-    return Compressor(
-        data.box, selection.best.static_force, weight=weight, max_positions=cells, limits=data.limits
-    )
 
 
 def _band(best: Candidate, residual: Float1D, rows: NDArray[np.bool_], repeats: Repeats) -> Band | None:
@@ -112,29 +97,31 @@ def _band(best: Candidate, residual: Float1D, rows: NDArray[np.bool_], repeats: 
 
 
 def _left_out(
-    best: Candidate,
-    compressor: Compressor,
-    force: Float1D,
-    fitted: NDArray[np.bool_],
-    left: NDArray[np.bool_],
-    fit: Fit = SeparableProblem.solve,
-) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
-    the positions and directions of these rows.
+    selection: ClassSelection, weight: Float1D | None, group: NDArray[np.intp], fit: Fit
+) -> Iterator[tuple[Float1D, NDArray[np.bool_], NDArray[np.bool_]]]:
+    """Yields, for each group (n,) of rows, the residual (n,) of the model fitted without it, the other rows
+    (n,), and the rows (n,) of the group within the positions and directions of the fitted ones.
 
-    `force` (n,) is that without the forces of mass and damping, and the rows of the compressor have it.
+    The rows have the weights `weight` (n,) in the fit, which is one of the force without mass and damping.
     """
-    data = best.data
-    if data.weight is not None:
-        fitted = fitted & (data.weight > 0.0)
-    left = left & inside(data.box, data.box[fitted])
-    if best.side is not None:
-        left &= np.isin(np.sign(best.side), np.sign(best.side[fitted]))
-    if not left.any():
-        return force, left
-    if best.model_class == "constant":
-        return force - float(np.mean(force[fitted])), left
-    rows = compressor.rows(best.side, fitted)
-    problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
-    solution = fit(problem, best.solution.basis)
-    return force - problem.force(solution, np.ascontiguousarray(data.box), best.side), left
+    best = selection.best
+    data, force, used = best.data, best.static_force, best.error.weight > 0.0
+    cells = selection.options.search.cells(len(data.names))
+    compressor = Compressor(data.box, force, weight=weight, max_positions=cells, limits=data.limits)
+    for number in np.unique(group[used]):
+        others = used & (group != number)
+        fitted = others if data.weight is None else others & (data.weight > 0.0)
+        left = used & (group == number) & inside(data.box, data.box[fitted])
+        if best.side is not None:
+            left &= np.isin(np.sign(best.side), np.sign(best.side[fitted]))
+        if not left.any():
+            yield force, others, left
+        elif best.model_class == "constant":
+            yield force - float(np.mean(force[fitted])), others, left
+        else:
+            rows = compressor.rows(best.side, fitted)
+            problem = problem_of(rows, resolved_by=best.problem.resolved_by)
+            problem = replace(problem, prior=best.problem.prior)
+            solution = fit(problem, best.solution.basis)
+            residual = force - problem.force(solution, np.ascontiguousarray(data.box), best.side)
+            yield residual, others, left
