@@ -88,5 +88,7 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     # hysteresis was refused, so rows without a direction need not be left out
     every_row = replace(rows, side=None, starts=None, parts=(), log=Log(findings=rows.log.findings))
     again = identified(select(every_row, options))
-    log = found.log + again.log
-    return replace(again, log=replace(log, decisions=latest(log.decisions)[0], findings=again.log.findings))
+    log = found.log
+    log.extend(again.log)
+    log.decisions, log.findings = latest(log.decisions)[0], again.log.findings
+    return replace(again, log=log)

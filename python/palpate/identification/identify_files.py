@@ -290,10 +290,12 @@ def _identified(
     rmse = _error_on_rows(summary, network)
     nrmse = rmse / spread if spread > 0 else 0.0
     source, errors = Source.merged(recording.source for recording in recordings), network.errors
+    log.extend(network.log)
+    log.decisions += untested
     network = replace(
         network,
         errors=replace(errors, rmse=rmse, nrmse=nrmse, settled_nrmse=(nrmse, errors.left_out_nrmse)),
-        log=log + network.log + Log(decisions=untested),
+        log=log,
     )
     if settings.period is None:
         network = replace(network, lower=np.array([summary.lower]), upper=np.array([summary.upper]))

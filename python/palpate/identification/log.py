@@ -52,7 +52,7 @@ class PathPoint:
 
 @dataclass
 class Log:
-    """What an identification reports, in order. The logs of two stages are added."""
+    """What an identification reports, in order."""
 
     path: list[PathPoint] = field(default_factory=list)
     """Networks that the model selection tested"""
@@ -64,9 +64,6 @@ class Log:
     """All other sentences, such as the rise of the error by constraints"""
     findings: list[Finding] = field(default_factory=list)
     """Findings that can lower the verdict"""
-
-    def __add__(self, other: Log) -> Log:
-        return Log(*(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def extend(self, later: Log) -> None:
         """Adds the entries of a later stage."""

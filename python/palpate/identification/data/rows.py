@@ -181,7 +181,7 @@ class Rows:
             return replace(self, counted=self.weight, limits=RowLimits(position_gap=gap))
         limits = RowLimits(force_error=STEP_ERROR * force_step(self.force[self.fitted]), position_gap=gap)
         again, repeats = repeated(self.positions, self.force, self.side)
-        log = self.log + Log(rows=[repeats] if repeats else [])
+        log = replace(self.log, rows=[*self.log.rows, repeats]) if repeats else self.log
         unused = again | ~self.fitted
         weight = np.where(unused, 0.0, 1.0) if unused.any() else None
         return replace(self, limits=limits, weight=weight, log=log)
@@ -258,10 +258,11 @@ def rows_of(
     found = input_columns(recordings, names)
     kept = [rows for _, rows in found]
     columns = [X[rows] for X, rows in found]
-    lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
-    no_velocity = f"{lost} rows at the ends and at gaps of time have no velocity and are not used."
     hysteresis = len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs)
     strokes = strokes_of(recordings) if hysteresis else stated_strokes(recordings)
+    if lost := sum(int(np.count_nonzero(~rows)) for rows in kept):
+        note = f"{lost} rows at the ends and at gaps of time have no velocity and are not used."
+        strokes.log.rows.append(note)
     side, order = (
         None if each is None else each[np.concatenate(kept)] for each in (strokes.side, strokes.order)
     )
@@ -297,7 +298,7 @@ def rows_of(
         starts,
         parts,
         period=options.period,
-        log=Log(rows=[no_velocity] if lost else []) + strokes.log,
+        log=strokes.log,
         corners=corners,
         role=role,
         repeats=repeats,
