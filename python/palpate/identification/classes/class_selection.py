@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import InputError
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..log import Log, in_words
+from ..log import Log, PathPoint, in_words
 from ..network.basis import Basis
 from ..network.constraints import (
     Bound,
@@ -132,7 +132,8 @@ class ClassSelection:
 
     def recorded(self, candidate: Candidate) -> Candidate:
         """Adds a candidate to the list of tested networks and returns it."""
-        self.log.path.append(candidate.point(self.options.criterion))
+        value = candidate.criterion(self.options.criterion)
+        self.log.path.append(PathPoint(candidate.model_class, candidate.n_wavelets, candidate.rmse, value))
         return candidate
 
     def constrained(self, candidate: Candidate) -> Candidate:

@@ -325,13 +325,11 @@ def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
     return float(way[end]) if most[end] <= max(best.rmse, near_zero) else 0.0
 
 
-def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
-    """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
+def limit_findings(best: Candidate, judged: Judged, limit: int) -> list[Finding]:
+    """Returns a finding if growth ended at `limit` wavelets although neighbouring residuals are still
     correlated, and a hand feels the error."""
-    limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
-    judged = judged_candidate(best)
     if best.error.rmse <= judged.floor and not place_findings(judged):
         return []
     return [
@@ -397,7 +395,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         of_shift
         or log.findings
         or energy_findings(best)
-        or limit_findings(best, options)
+        or limit_findings(best, judged, options.max_wavelets)
         or drift_findings(judged)
         or place_findings(judged)
     )

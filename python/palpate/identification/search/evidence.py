@@ -31,7 +31,7 @@ from ..data.compression import Compressed, Compressor, HeldOutRows, around_seam
 from ..data.limits import evenly_spread
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..log import Decision, Log, PathPoint, decided, in_words, lowered
+from ..log import Decision, Log, decided, in_words, lowered
 from ..network.fitted import FittedNetwork, parameters_of
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
@@ -259,11 +259,6 @@ class Candidate:
         total = problem.total(squares * problem.samples / rows - problem.within)
         n = problem.independent * rows / problem.samples
         return deviance(name, total * n / problem.samples, n, self.n_parameters)
-
-    def point(self, name: str) -> PathPoint:
-        """Returns this candidate as an entry of the list of tested networks, with the value of the named
-        criterion."""
-        return PathPoint(self.model_class, self.n_wavelets, self.rmse, self.criterion(name))
 
     def force_at(self, rows: slice | NDArray[np.intp] = ALL_ROWS) -> Float1D:
         """Returns the force (n,) of the candidate without the forces of mass and damping, at all rows or at
