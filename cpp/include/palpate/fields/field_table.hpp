@@ -92,12 +92,13 @@ class FieldTable {
 
     /// Calls `visit` once, with all descriptions as its arguments, and returns the result.
     template <class Visit>
-    constexpr auto apply(const Visit& visit) const {
+    constexpr auto apply(const Visit& visit) const {  // NOLINT(modernize-use-nodiscard): void for some visits
         return apply(visit, std::index_sequence_for<Fields...>{});
     }
 
   private:
     template <class Visit, std::size_t... k>
+    // NOLINTNEXTLINE(modernize-use-nodiscard): void for some visits
     constexpr auto apply(const Visit& visit, std::index_sequence<k...> /*numbers*/) const {
         return visit(static_cast<const detail::TableEntry<k, Fields>&>(entries_).field...);
     }
