@@ -19,10 +19,10 @@ from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.roles import Informative, role_counts, unused_rows
-from ..verdict import Finding, Verdict
-from .classes.causes import first_strokes
+from ..verdict import Finding, Verdict, usable
+from .classes.causes import FIRST_CURE, first_strokes
 from .classes.class_selection import VELOCITY_INPUTS
-from .classes.findings import USABLE_NRMSE, drift_findings, judged_network, verdict_of
+from .classes.findings import USABLE_NRMSE, judged_network, verdict_of
 from .classes.memory import better_with_memory
 from .data.period import period_of, revolution_of
 from .data.rows import require_in_range, rows_of
@@ -150,7 +150,9 @@ def identify(
             if (findings := drop(network, informative)) is not None:
                 fitted = recordings = informative.recordings
                 network = _identified(recordings, fitted, settings, object_of)
-                network.log.findings[:0] = findings
+                # Behind rows that are left out, the strokes that follow are the first ones.
+                left = [each for each in network.log.findings if FIRST_CURE not in each.sentence]
+                network.log.findings[:] = [*findings, *left] if findings else network.log.findings
     rows = network.rows
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
@@ -187,10 +189,11 @@ def _drop_first_strokes(network: FittedNetwork, informative: Informative) -> lis
     if network.memory is not None or not whole:
         return None
     judged = judged_network(network, network.rows)
-    if (first := first_strokes(judged)) is None:
+    if judged.cause is None or (first := first_strokes(judged)) is None:
         return None
     informative.drop_first_strokes(first)
-    return drift_findings(judged)
+    left_out = f"These {np.count_nonzero(first)} rows are left out: the model is that of the later strokes"
+    return [usable(judged.cause.sentence.replace(FIRST_CURE, left_out))]
 
 
 def _identified(

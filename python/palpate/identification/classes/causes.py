@@ -49,9 +49,11 @@ TURNED = (
 )
 """Sentence on strokes that differ by the turn before them"""
 
+FIRST_CURE = "Press the object several times before the recording, or leave out the first strokes with --rows"
+
 FIRST = (
     "behind the first stroke over a position the force there {} by {}: the object or the zero of the force "
-    "changed. Press the object several times before the recording, or leave out the first strokes with --rows"
+    f"changed. {FIRST_CURE}"
 )
 """Sentence on a first stroke that differs from the later ones"""
 
@@ -103,6 +105,12 @@ class Judged:
     def cause(self) -> Cause | None:
         """Cause of what differs between strokes over the same place; None if no cause lowers BIC."""
         return _cause_of(self)
+
+    @property
+    def changed(self) -> float:
+        """Mean square of the force [force^2] that a zero or an object that changes explains of the residual:
+        a term that is harder to render must explain more. 0 if nothing changes."""
+        return self.cause.explained if self.cause is not None and self.cause.by in (FIRST, LATER) else 0.0
 
     @property
     def floor(self) -> float:
@@ -193,7 +201,8 @@ class _Strokes:
         of each row, the change of the value whose effect the sentence states, and the fitted functions."""
         data = self.best.data
         x = data.path[:, 0]
-        yield FIRST, self.again, 1.0, [self.again]
+        again = self.again(wholly=False).astype(float)
+        yield FIRST, again, 1.0, [again]
         if data.parts:
             velocity, known = at_rows(data.parts, least_error_low_pass(data.parts, order=1), 1, len(x))
             time = np.concatenate([piece.row_time for piece in data.parts])
@@ -216,14 +225,14 @@ class _Strokes:
         middle = 0.5 * (self.begin + self.end) / len(x)
         yield LATER, middle, 1.0, [middle]
 
-    @cached_property
-    def again(self) -> Float1D:
-        """(k,) 1 for a row at a place that is wholly within the earlier strokes, else 0"""
+    def again(self, wholly: bool) -> NDArray[np.bool_]:
+        """Returns True (k,) for a row at a place that is within the earlier strokes, wholly or in part."""
         data = self.best.data
         x = data.path[:, 0]
         low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
         place = np.rint(x - data.box[:, 0])[self.rows] * PLACES + self.group % PLACES
-        return ((low * PLACES <= place) & (place + 1.0 <= high * PLACES)).astype(float)
+        first, last = (place, place + 1.0) if wholly else (place + 1.0, place)
+        return np.asarray((low * PLACES <= first) & (last <= high * PLACES))
 
     @cached_property
     def first(self) -> NDArray[np.intp]:
@@ -256,8 +265,11 @@ def first_strokes(best: Judged) -> NDArray[np.bool_] | None:
         return None
     strokes, first = _Strokes.of(best), np.zeros(len(best.weight), dtype=bool)
     assert strokes is not None
-    again = strokes.again > 0.0
-    first[strokes.rows[~again & np.isin(strokes.group, strokes.group[again])]] = True
+    again = strokes.again(wholly=False)
+    # A stroke mostly over new places is a first one also at those that it has in part in common.
+    new = np.bincount(strokes.number, ~again) > 0.5 * np.bincount(strokes.number)
+    alone = ~again | (new[strokes.number] & ~strokes.again(wholly=True))
+    first[strokes.rows[alone & np.isin(strokes.group, strokes.group[again])]] = True
     return first
 
 

@@ -186,9 +186,9 @@ class Dynamics:
         self, basis: Basis, strokes: HysteresisInput | None
     ) -> tuple[dict[str, float], list[Decision], list[Finding]]:
         """Returns accepted values of damping and mass for given wavelets of the force, the decisions on both,
-        and a finding on a value below zero that a hand notices.
+        and a finding on a damping below zero that a hand notices.
 
-        No passive object has such a value, but a late force F(t - t0) = F - t0 dF/dt shows one.
+        No passive object has one, but a late force F(t - t0) = F - t0 dF/dt shows it.
         """
         regression = self._regression(basis, strokes)
         if regression is None:
@@ -236,18 +236,19 @@ class Dynamics:
                 value = found / self._data.force_unit.scale
                 number = f"{value:.4g} {self._unit_of(name)}".rstrip()
                 reason = f"the fitted {name} is {number}, a passive object has > 0"
-                if share - error >= LEAST_GAIN and self._noticed(name, found):
+                # A mass below zero is no proof: an elastic mount of a damper shows one too.
+                if name == "damping" and share - error >= LEAST_GAIN and self._noticed(found):
                     cause = "a force that is recorded late shows this; give --force-late-s SECONDS, its delay"
                     findings.append(usable(f"{reason}, and a hand notices its force: {cause}"))
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions, findings
 
-    def _noticed(self, name: str, value: float) -> bool:
-        """True if the force of a damping or a mass is above a just noticeable difference on average."""
-        derived, known = self._derivatives[TERMS.index(name)]
+    def _noticed(self, damping: float) -> bool:
+        """True if the force of a damping is above a just noticeable difference on average."""
+        velocity, known = self._derivatives[TERMS.index("damping")]
         force = self._data.force
         jnd = force_jnd(force[known], FORCE_FLOOR * float(np.abs(force).max()))
-        return bool(np.mean(np.abs(value * derived[known]) / jnd) > 1.0)
+        return bool(np.mean(np.abs(damping * velocity[known]) / jnd) > 1.0)
 
     def _mass_not_tested(self) -> Decision:
         """Returns the decision that mass is not tested, with the mass whose force a hand would feel if each

@@ -354,7 +354,9 @@ def hidden_by_friction(best: Candidate, decisions: Sequence[Decision]) -> list[D
     if direction is None or turns_of(direction) < 2:
         cures["a moved zero"] = "press a second time"
     if one_speed:
-        cures["a late force"] = "record the time, slow and fast strokes"
+        cures["a late force"] = (
+            f"record {'' if data.parts else 'the time, '}slow and fast strokes of many rows"
+        )
     cure = f"the loop of friction hides {', '.join(cures)}; {', '.join(cures.values())}"
     return [Decision("measuring faults", "not tested", cure)]
 

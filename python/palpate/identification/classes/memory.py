@@ -32,7 +32,6 @@ from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import deviance, on_fitted_rows
-from .causes import FIRST, LATER
 from .class_selection import VELOCITY_INPUTS
 from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
 from .memory_fit import CURVE_POINTS, MemoryFit, Motion, Ranges, Resting, Shape
@@ -462,12 +461,10 @@ def _with_memory(
 
 
 def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
-    """Returns the mean square of the force [force^2] that a zero or an object that changes explains of the
-    residual without memory, as branches can: a memory must explain more. 0 if nothing changes."""
-    if len(found.errors.residual) != sum(map(len, recordings)):
-        return 0.0
-    cause = judged_network(found, found.rows).cause
-    return cause.explained if cause is not None and cause.by in (FIRST, LATER) else 0.0
+    """Returns the mean square of the force [force^2] that a zero or an object that changes explains; 0 if
+    some rows have no residual, such as those at gaps of time."""
+    whole = len(found.errors.residual) == sum(map(len, recordings))
+    return judged_network(found, found.rows).changed if whole else 0.0
 
 
 def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:

@@ -131,7 +131,8 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
         return below
     damped = moving is not None and moving.mass is None
     residual = below.static_force - below.force_at()
-    cause = judged_candidate(below).cause
+    judged = judged_candidate(below)
+    cause = judged.cause
     if cause is None or not (cause.by == FASTER and cause.perceptible and cause.share >= LEAST_GAIN):
         if not (damped or below.settled.nrmse > USABLE_NRMSE):
             return below
@@ -165,6 +166,9 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
         unshifted = (grown.problem.rmse(grown.solution) / shift.before) ** 2
         before, unknown = before * unshifted, unknown * unshifted
         compared = f"{compared} with shifted strokes"
+    if judged.changed:
+        before -= judged.changed * float(np.sum(below.fit_weight))
+        compared = f"{compared} and a zero or an object that changes"
     share = 1.0 - (after + unknown) / before if before > 0.0 else 0.0
     change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
     bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"

@@ -212,6 +212,19 @@ def test_a_first_press_that_differs_is_not_fitted(sign: float) -> None:
     assert model.verdict.reasons[0].startswith("behind the first stroke over a position")
 
 
+@pytest.mark.parametrize("rows", [60, 237])
+def test_the_first_of_two_presses_is_not_fitted_if_it_is_stiffer(rows: int) -> None:
+    """The second press is a little deeper, so that the last place of the travel is first met there."""
+    press = np.sin(np.linspace(0.0, 0.5 * np.pi, rows)) ** 2
+    x = np.r_[press, press[::-1], 1.005 * press, 1.005 * press[::-1]]
+    stiffer = np.where(np.arange(len(x)) < rows, 1.2, 1.0)
+    force = 10.0 * x * stiffer + np.random.default_rng(rows).normal(0.0, 0.02, len(x))
+    model = palpate.identify(palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x))))
+    assert model.force(0.5) == pytest.approx(5.0, abs=0.1)
+    (reason,) = model.verdict.reasons
+    assert "rows are left out: the model is that of the later strokes" in reason
+
+
 def test_strokes_that_differ_by_their_speed_are_not_only_called_a_changed_object() -> None:
     """The strokes become faster, and velocity is not among the inputs."""
     x = np.concatenate([np.r_[np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)] for n in (200, 100, 50)])
