@@ -236,7 +236,7 @@ class Dynamics:
                 value = found / self._data.force_unit.scale
                 number = f"{value:.4g} {self._unit_of(name)}".rstrip()
                 reason = f"the fitted {name} is {number}, a passive object has > 0"
-                # A mass below zero is no proof: an elastic mount of a damper shows one too.
+                # A mass below zero proves nothing: an elastic mount of a damper shows one too.
                 if name == "damping" and share - error >= LEAST_GAIN and self._noticed(found):
                     cause = "a force that is recorded late shows this; give --force-late-s SECONDS, its delay"
                     findings.append(usable(f"{reason}, and a hand notices its force: {cause}"))
