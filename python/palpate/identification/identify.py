@@ -150,9 +150,9 @@ def identify(
             if (findings := drop(network, informative)) is not None:
                 fitted = recordings = informative.recordings
                 network = _identified(recordings, fitted, settings, object_of)
-                # Behind rows that are left out, the strokes that follow are the first ones.
-                left = [each for each in network.log.findings if FIRST_CURE not in each.sentence]
-                network.log.findings[:] = [*findings, *left] if findings else network.log.findings
+                if findings:  # behind rows that are left out, the strokes that follow are the first ones
+                    later = [each for each in network.log.findings if FIRST_CURE not in each.sentence]
+                    network.log.findings[:] = [*findings, *later]
     rows = network.rows
     # A memory is fitted to the rows that wait as well.
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
@@ -176,10 +176,8 @@ def _drop_wrong_readings(network: FittedNetwork, informative: Informative) -> li
     """Drops rows whose residual is that of a wrong reading; returns None if there are none."""
     # Rows behind a turn with a small weight share an error: none of them is wrong alone.
     counted = network.errors.share * network.errors.residual
-    if len(counted) != sum(map(len, informative.recordings)):
-        return None
-    ends = np.cumsum([len(each) for each in informative.recordings])[:-1]
-    return [] if informative.drop_wrong_readings(np.split(counted, ends)) else None
+    whole = len(counted) == sum(map(len, informative.recordings))
+    return [] if whole and informative.drop_wrong_readings(counted) else None
 
 
 def _drop_first_strokes(network: FittedNetwork, informative: Informative) -> list[Finding] | None:

@@ -93,6 +93,11 @@ def latest(decisions: Iterable[Decision]) -> tuple[list[Decision], list[Decision
     return list(last.values()), replaced
 
 
+def not_tested(model_class: str, decisions: Iterable[Decision]) -> list[Decision]:
+    """Returns the decisions that a model class is not tested."""
+    return [each for each in decisions if each.model_class == model_class and each.outcome == "not tested"]
+
+
 def lowered(quantity: str, decrease: float) -> str:
     """Returns the change of a quantity in words, as "lowers BIC by 1455" or "raises BIC by 2"."""
     return f"{_verb(decrease)} {quantity} by {_short(decrease)}"

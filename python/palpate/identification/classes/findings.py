@@ -18,7 +18,7 @@ from ...verdict import Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import Rows, period_notes
 from ..data.strokes import weights_of_shared_errors
-from ..log import Decision, Log, causes_of_crossing, latest, shifted_strokes
+from ..log import Decision, Log, causes_of_crossing, latest, not_tested, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import Errors, FittedNetwork
 from ..options import IdentifyOptions
@@ -347,9 +347,7 @@ def hidden_by_friction(best: Candidate, decisions: Sequence[Decision]) -> list[D
     if best.strokes is None or len(data.names) > 1:
         return []
     direction = strokes_from_order(data.path[:, 0])
-    one_speed = not data.parts or any(
-        each.model_class == "damping" and each.outcome == "not tested" for each in decisions
-    )
+    one_speed = not data.parts or not_tested("damping", decisions)
     cures = {"backlash": "mount the object without it"}
     if direction is None or turns_of(direction) < 2:
         cures["a moved zero"] = "press a second time"

@@ -27,7 +27,7 @@ from ...verdict import Finding, usable
 from ..data.limits import LEAST_GAIN
 from ..data.rows import Rows, rows_of
 from ..fit import fit_rows
-from ..log import Decision, Log, decided, lowered, squared_error_change
+from ..log import Decision, Log, decided, lowered, not_tested, squared_error_change
 from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
@@ -485,9 +485,8 @@ def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
 
 def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iterator[Finding]:
     """Yields a finding if neither pauses nor different speeds show whether the force depends on time."""
-    for decision in found.log.decisions:
-        constant = decision.model_class == "damping" and decision.outcome == "not tested"
-        if constant and not any((roles_of(part) == Role.HOLD).any() for part in recordings):
+    for decision in not_tested("damping", found.log.decisions):
+        if not any((roles_of(part) == Role.HOLD).any() for part in recordings):
             yield usable(
                 "the rows do not show whether the force relaxes with time or depends on earlier motion, as "
                 f"friction and plasticity do: the tool never waits in contact, and {decision.reason}. Cure: "
