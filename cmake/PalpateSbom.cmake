@@ -29,9 +29,6 @@ palpate_component(nlohmann-json "${nlohmann_json_VERSION}" MIT "pkg:github/nlohm
 if(PALPATE_BUILD_CONTROL)
   palpate_component(CLI11 "${CLI11_VERSION}" BSD-3-Clause "pkg:github/CLIUtils/CLI11@v")
 endif()
-if(TARGET Boost::headers)
-  palpate_component(boost "${Boost_VERSION}" BSL-1.0 "pkg:github/boostorg/boost@boost-")
-endif()
 list(JOIN palpate_components ",\n" palpate_components)
 file(
   CONFIGURE

@@ -12,7 +12,8 @@ shift
 hang_s=20
 memory_mb=1024
 
-declare -A longest=([packets]=192 [firmware]=160 [exported_model]=96 [device_profile]=1024 [inverse3]=1024)
+declare -A longest=([packets]=192 [firmware]=160 [exported_model]=96 [device_profile]=1024 [inverse3]=1024
+    [web_socket]=1024)
 targets=("$@")
 if [ "${#targets[@]}" -eq 0 ]; then
     for source in tests/fuzz/fuzz_*.cpp; do

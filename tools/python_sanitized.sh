@@ -17,7 +17,6 @@ if [ ${#tests[@]} -eq 0 ]; then
     tests=(tests/python/core tests/python/model tests/python/planning tests/python/verification tests/python/identification/network)
 fi
 
-# The thread sanitizer warns of the fences of Boost.Asio, which it does not support.
 cmake --preset "$preset" -B "$build" -DPALPATE_BUILD_TESTS=OFF -DPALPATE_BUILD_PYTHON=ON \
     -DPALPATE_WARNINGS_AS_ERRORS=OFF \
     -DPython_EXECUTABLE="$PWD/$python" -Dpybind11_DIR="$($python -m pybind11 --cmakedir)" >/dev/null

@@ -32,12 +32,11 @@ missing_packages() {
     python_says 'import venv, ensurepip' || echo python3-venv
     python_says 'import os, sysconfig
 assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' || echo python3-dev
-    # The build of the compiled module needs the libraries for model files, USB and the WebSocket of a Haply Inverse3. If
-    # they are installed later, the module lacks these functions.
+    # The build of the compiled module needs the libraries for model files and USB. If they are installed later, the module
+    # lacks these functions.
     command -v pkg-config >/dev/null || echo pkg-config
     compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
     compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
-    compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
     if [ "$purpose" = control ]; then
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
     fi

@@ -6,16 +6,15 @@
 // variable PALPATE_EMULATOR names its socket. No result depends on the speed of the computer, and a wait takes no real
 // time. Production code is unchanged: this library replaces the functions of the C library that read the clock or wait.
 //
-// Virtual time begins when the program locks its memory for a control loop, when libusb or Boost.Asio creates a timer,
-// or when the program connects to the socket of an emulated drive. The timer fails, so that they compute their timeouts
-// from this clock.
+// Virtual time begins when the program locks its memory for a control loop, when libusb creates a timer, or when the
+// program connects to a TCP socket or to the socket of an emulated drive. The timer fails, so that libusb computes its
+// timeouts from this clock.
 #include <dlfcn.h>
 #include <linux/futex.h>
 #include <linux/sockios.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
-#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
@@ -374,18 +373,15 @@ int poll(pollfd* files, nfds_t count, int timeout_ms) {
     return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
 }
 
-/// The socket of an emulated drive carries messages (SOCK_SEQPACKET).
+/// The socket of an emulated drive carries messages (SOCK_SEQPACKET); that of the service of an Inverse3 is TCP.
 int connect(int file, const sockaddr* address, socklen_t size) {
-    const int code = REAL(connect)(file, address, size);
-    const int error = errno;
     int type = 0;
     socklen_t length = sizeof type;
-    if (code == 0 && address->sa_family == AF_UNIX &&
-        ::getsockopt(file, SOL_SOCKET, SO_TYPE, &type, &length) == 0 && type == SOCK_SEQPACKET) {
+    if (::getsockopt(file, SOL_SOCKET, SO_TYPE, &type, &length) == 0 &&
+        (type == SOCK_SEQPACKET || (type == SOCK_STREAM && address->sa_family != AF_UNIX))) {
         HostClock::get().start();
     }
-    errno = error;
-    return code;
+    return REAL(connect)(file, address, size);
 }
 
 /// Waits for the answer of an emulated drive, a process of this machine whose answer takes no virtual time. The drive
@@ -410,17 +406,6 @@ int ppoll(pollfd* files, nfds_t count, const timespec* timeout, const sigset_t* 
         HostClock::get().sleep(of(*timeout) + now);
     }
     return ready;
-}
-
-int epoll_wait(int set, epoll_event* events, int most, int timeout_ms) {
-    if (is_virtual() && timeout_ms != 0) {
-        pollfd files{set, POLLIN, 0};
-        if (poll(&files, 1, timeout_ms) < 0) {
-            return -1;
-        }
-        timeout_ms = 0;
-    }
-    return REAL(epoll_wait)(set, events, most, timeout_ms);
 }
 
 int pthread_create(pthread_t* id, const pthread_attr_t* attributes, void* (*routine)(void*), void* argument) {

@@ -81,6 +81,15 @@ def main() -> None:
     for name, identifier in {"state": "049D", "quotes_in_name": '0"\\\u2028'}.items():
         message = json.dumps({"session_id": 7, "inverse3": [{**device, "device_id": identifier}]})
         write("inverse3", name, struct.pack("<Bd", 2, 1.5) + message.encode())
+    message = b"\x81\x7e" + struct.pack(">H", 200) + b"m" * 200
+    parts = b"\x01\x03one" + b"\x89\x01?" + b"\x00\x00" + b"\x8a\x00" + b"\x80\x03two"
+    longest = b"\x82\x7f" + struct.pack(">Q", 1 << 20) + b"m"
+    for name, frames in {
+        "messages": message + parts + b"\x88\x02\x03\xe8",
+        "masked": parts + b"\x81\x81\x00\x00\x00\x00m",
+        "longest": b"\x81\x02{}" + longest,
+    }.items():
+        write("web_socket", name, b"\x02" + frames)
     for name, line in {
         "rendering": "m.json --device simulated --rate-hz 1000 --structure massless --mass 0.1 --predict 3",
         "guards": "m.json --force-limit 2 --slew-s 0.1 --no-energy-account --tolerated-samples 3 --ramp-s=1",

@@ -151,7 +151,7 @@ def test_the_wheel_lists_the_libraries_that_are_compiled_into_it(wheel: Path) ->
     with zipfile.ZipFile(wheel) as archive:
         module = next(archive.read(name) for name in archive.namelist() if "/_core." in name)
     # Names of the libraries in the module; CLI11 is in palpate-control.
-    compiled = {"nlohmann-json": b"nlohmann", "pybind11": b"pybind11", "boost": b"boost"}
+    compiled = {"nlohmann-json": b"nlohmann", "pybind11": b"pybind11"}
     expected = {name for name, word in compiled.items() if word in module} | {"CLI11"}
     assert {"nlohmann-json", "pybind11"} <= expected
     assert components.keys() == expected
@@ -166,12 +166,9 @@ def test_the_wheel_contains_the_licence_of_each_library(wheel: Path) -> None:
     listed = list_of_libraries(wheel, "palpate.cdx.json")
     folder = f"palpate-{wheel.name.split('-')[1]}.dist-info/licenses/licenses/"
     texts = {name.removeprefix(folder) for name in names_of(wheel) if name.startswith(folder)}
-    assert texts == {f"{each['name'].lower()}.txt" for each in listed["components"]} | {
-        "libusb.txt",
-        "boost.txt",
-    }
+    assert texts == {f"{each['name'].lower()}.txt" for each in listed["components"]} | {"libusb.txt"}
     for path in (ROOT / "licenses").iterdir():
-        assert "opyright" in path.read_text(encoding="utf-8") or path.name == "boost.txt"
+        assert "opyright" in path.read_text(encoding="utf-8")
 
 
 @needs_tools

@@ -67,6 +67,7 @@ OPTIONAL_HEADERS = {
     "device/mit_device.hpp",
     "device/moteus_device.hpp",
     "device/usb.hpp",
+    "device/web_socket.hpp",
     "device/wheel_device.hpp",
     "io/detail/model_file.hpp",
     "io/detail/plan_file.hpp",

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the messages without libusb and Boost. tests/usb and the Python tests use an
-// emulated device.
+// Tests of the messages without libusb. tests/usb and the Python tests use an emulated device.
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -44,26 +43,12 @@ TEST(OpenUsb, NamesThePackageThatIsMissing) {
 
 #endif
 
-#ifndef PALPATE_HAS_INVERSE3
-
-TEST(OpenInverse3, NamesThePackageThatIsMissing) {
-    RenderOptions options;
-    options.device = "inverse3:x";
-    EXPECT_EQ(
-        refusal([&] { (void)open_inverse3(options, line()); }),
-        "device inverse3:x: palpate was built without Boost; install libboost-dev and build palpate again");
-}
-
-#else
-
 TEST(OpenInverse3, RefusesAModelInOtherUnits) {
     RenderOptions options;
     options.device = "inverse3";
     EXPECT_EQ(refusal([&] { (void)open_inverse3(options, line()); }),
               "a.json is in mm and N; an Inverse3 moves along a line and needs a model in m and N");
 }
-
-#endif
 
 }  // namespace
 }  // namespace palpate

@@ -14,15 +14,11 @@
 #include <system_error>
 #include <utility>
 
-#include <boost/asio/connect.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/websocket.hpp>
 #include <nlohmann/json.hpp>
 
 #include "palpate/device/device.hpp"
 #include "palpate/device/inverse3_messages.hpp"
+#include "palpate/device/web_socket.hpp"
 
 namespace palpate {
 
@@ -77,7 +73,8 @@ class Inverse3Device {
         const std::string service = settings_.host + ":" + std::to_string(settings_.port);
         try {
             connect(service);
-            info_ = read_inverse3_inventory(received(service, "reports no device"), service);
+            receive(service, "reports no device");
+            info_ = read_inverse3_inventory(link_->newest_message, service);
             begin_session(service);
         } catch (const nlohmann::json::exception& error) {
             link_.reset();
@@ -94,14 +91,14 @@ class Inverse3Device {
     /// next exchange reads it together with the answer to its command.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         last_.status = Status::Fault;
-        if (link_ && !link_->disconnected) {
+        if (link_ && link_->socket.is_open()) {
             try {
                 last_.status = exchanged(std::isfinite(command.force) ? command.force : 0.0);
             } catch (const std::exception&) {
                 link_->is_wrong = true;
             }
         }
-        if (!link_ || link_->disconnected) {
+        if (!link_ || !link_->socket.is_open()) {
             last_.applied = 0.0;
         }
         return last_;
@@ -115,14 +112,8 @@ class Inverse3Device {
         ZeroForce zero_force = ZeroForce::NotSent;
         try {
             zero_force = end_force();
-            if (!link_->disconnected) {
-                bool closed = false;
-                link_->stream.async_close(boost::beast::websocket::close_code::normal,
-                                          [&closed](const Error& /*any*/) { closed = true; });
-                link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
-            }
+            link_->socket.close(Clock::now() + std::chrono::milliseconds{200});
         } catch (const std::exception&) {
-            link_->disconnected = true;
         }
         link_.reset();
         return zero_force;
@@ -133,26 +124,16 @@ class Inverse3Device {
     [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
 
   private:
-    using Error = boost::system::error_code;
-    using Clock = std::chrono::steady_clock;
-    using Time = Clock::time_point;
+    using Clock = WebSocket::Clock;
+    using Time = WebSocket::Time;
 
-    /// A connection to the service and its unfinished operations. The address of a Link must not change, because
-    /// handlers store the address.
+    /// A connection to the service, and what was sent and received.
     struct Link {
-        boost::asio::io_context context;
-        boost::beast::websocket::stream<
-            boost::beast::basic_stream<boost::asio::ip::tcp, boost::asio::io_context::executor_type>, false>
-            stream{context};
-        boost::beast::flat_buffer buffer;
-        std::string message;       ///< message to the service that is being sent
-        std::string command_head;  ///< start of each command's text, up to the force
-        bool sending = false;
-        bool reading = false;
-        bool disconnected = false;
+        WebSocket socket;
+        std::string message;         ///< message to the service that was sent last
+        std::string command_head;    ///< start of each command's text, up to the force
         bool is_wrong = false;       ///< true after a message that differs from the documentation
         int unanswered = 0;          ///< sent messages that the service has not answered
-        std::uint64_t unasked = 0;   ///< messages of the service without a message that they answer
         std::string newest_message;  ///< message that the service sent last
         Time sent = Clock::now();    ///< time at which the last command was sent
         /// Earliest time of the first state that the force of the device does not take into account, now and before the
@@ -164,35 +145,11 @@ class Inverse3Device {
         int states_without_effect = 0;
         Time start = Clock::now();
 
-        /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns
-        /// the last result of `done`.
-        template <class Done>
-        bool run(std::chrono::milliseconds within, Done done) {
-            const auto until = Clock::now() + within;
-            context.restart();
-            while (!done() && context.run_one_until(until) > 0) {
-            }
-            return done();
-        }
-
-        /// Receives messages whenever `run` is called, and keeps the newest.
-        void receive() {
-            if (reading || disconnected) {
-                return;
-            }
-            reading = true;
-            stream.async_read(buffer, [this](const Error& error, std::size_t /*size*/) {
-                reading = false;
-                disconnected = disconnected || error;
-                if (disconnected) {
-                    return;
-                }
-                newest_message = boost::beast::buffers_to_string(buffer.data());
-                buffer.clear();
-                unasked += unanswered > 0 ? 0 : 1;
-                unanswered = std::max(unanswered - 1, 0);
-                receive();
-            });
+        /// Receives the next message of the service, which answers the oldest unanswered one. Returns false without it.
+        [[nodiscard]] bool receive(Time until) {
+            const bool received = socket.receive(newest_message, until);
+            unanswered = std::max(unanswered - (received ? 1 : 0), 0);
+            return received;
         }
     };
 
@@ -202,53 +159,20 @@ class Inverse3Device {
 
     /// Connects to the service. Throws an error with the likely cure if no service answers.
     void connect(const std::string& service) {
-        const auto refuse = [&](const std::string& reason) {
+        const std::string reason =
+            link_->socket.open(settings_.host, settings_.port, Clock::now() + settings_.step_timeout);
+        if (!reason.empty()) {
             throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + reason +
                                      "): start Haply Hub, or the service itself");
-        };
-        Error error;
-        const auto address = boost::asio::ip::make_address(settings_.host, error);
-        if (error) {
-            refuse("'" + settings_.host + "' is not an address");
         }
-        bool done = false;
-        const auto finished = [&](const Error& result) {
-            error = result;
-            done = true;
-        };
-        const auto await = [&] {
-            if (!link_->run(settings_.step_timeout, [&done] { return done; })) {
-                refuse("no answer");
-            }
-            if (error) {
-                refuse(error.message());
-            }
-            done = false;
-        };
-        boost::beast::get_lowest_layer(link_->stream).async_connect({address, settings_.port}, finished);
-        await();
-        boost::beast::get_lowest_layer(link_->stream)
-            .socket()
-            .set_option(boost::asio::ip::tcp::no_delay{true});
-        link_->stream.async_handshake(service, "/", finished);
-        await();
     }
 
-    /// Returns the next message of the service while the device is being opened.
-    [[nodiscard]] std::string received(const std::string& service, const char* failure) {
-        bool done = false;
-        Error error;
-        link_->stream.async_read(link_->buffer, [&](const Error& result, std::size_t /*size*/) {
-            error = result;
-            done = true;
-        });
-        if (!link_->run(settings_.step_timeout, [&done] { return done; }) || error) {
+    /// Waits for the next message of the service while the device is being opened.
+    void receive(const std::string& service, const char* failure) {
+        if (!link_->receive(Clock::now() + settings_.step_timeout)) {
             throw std::runtime_error("the Haply Inverse Service at " + service + " " + failure +
-                                     (error ? ": " + error.message() : ""));
+                                     (link_->socket.is_open() ? "" : ": it ended the connection"));
         }
-        std::string text = boost::beast::buffers_to_string(link_->buffer.data());
-        link_->buffer.clear();
-        return text;
     }
 
     /// Sends the name of this program and the filters, then a request of the configuration, each with zero force. Takes
@@ -264,55 +188,44 @@ class Inverse3Device {
         link_->origin = link_->state.position;
         last_ = {};
         skipped_states_ = 0;
-        link_->receive();
     }
 
     /// Sends a message with zero force and waits for the answer, while the device is being opened.
     void request(const std::string& service, const char* head) {
-        write_message(0.0, head);
-        Error error;
-        link_->sent = Clock::now();
-        link_->stream.write(boost::asio::buffer(link_->message), error);
-        link_->newest_message = received(service, "does not answer a command");
+        send_command(0.0, head, settings_.step_timeout);
+        receive(service, "does not answer a command");
     }
 
-    /// Writes a command with this force as the next message to the service.
-    void write_message(double force, const char* head) {
+    /// Sends a message with a force command to the service.
+    void send_command(double force, const char* head, std::chrono::milliseconds within) {
         write_inverse3_command(link_->message, head, link_->command_head, settings_.axis,
                                -settings_.direction * force);
+        ++link_->unanswered;
+        link_->sent = Clock::now();
+        link_->socket.send(link_->message, link_->sent + within);
     }
 
-    /// Sends a force command, unless another one is being sent, and waits for the answer of the service. Returns false
-    /// without an answer.
+    /// Sends a force command and waits for the answer of the service. Returns false without an answer.
     bool is_answered(double force) {
-        Link& link = *link_;
-        if (!link.sending) {
-            write_message(force, "{");
-            link.sending = true;
-            ++link.unanswered;
-            link.sent = Clock::now();
-            link.stream.async_write(boost::asio::buffer(link.message),
-                                    [&link](const Error& error, std::size_t /*size*/) {
-                                        link.sending = false;
-                                        link.disconnected = link.disconnected || error;
-                                    });
+        send_command(force, "{", settings_.answer_timeout);
+        const Time until = link_->sent + settings_.answer_timeout;
+        while (link_->unanswered > 0 && link_->receive(until)) {
         }
-        const bool ended = link.run(settings_.answer_timeout, [&link] {
-            return link.disconnected || (!link.sending && link.unanswered == 0);
-        });
-        return ended && !link.disconnected;
+        return link_->unanswered == 0;
     }
 
     /// Reads the messages that arrived since the last exchange. Returns true if one of them answers no command.
     bool skip_waiting_states() {
-        Link& link = *link_;
-        const std::uint64_t before = link.unasked;
-        link.context.restart();
-        for (const Time until = Clock::now() + settings_.answer_timeout;
-             link.context.poll_one() > 0 && Clock::now() < until;) {
+        const std::uint64_t before = skipped_states_;
+        const Time until = Clock::now() + settings_.answer_timeout;
+        for (Time now = Clock::now(); now < until; now = Clock::now()) {
+            const bool is_answer = link_->unanswered > 0;
+            if (!link_->receive(now)) {
+                break;
+            }
+            skipped_states_ += is_answer ? 0 : 1;
         }
-        skipped_states_ += link.unasked - before;
-        return link.unasked != before;
+        return skipped_states_ != before;
     }
 
     /// Sends a force command and waits for the service's next message with the position. Returns the tick's status.
@@ -320,7 +233,7 @@ class Inverse3Device {
         Link& link = *link_;
         const bool has_skipped = skip_waiting_states();
         const bool answered = is_answered(link.is_wrong ? 0.0 : force);
-        if (link.disconnected || link.is_wrong) {
+        if (!link.socket.is_open() || link.is_wrong) {
             return Status::Fault;
         }
         read_state();
@@ -347,17 +260,15 @@ class Inverse3Device {
 
     /// Sends zero force until the service reports it, at most for the longest wait of an answer.
     [[nodiscard]] ZeroForce end_force() {
-        Link& link = *link_;
-        link.run(settings_.answer_timeout, [&link] { return link.disconnected || !link.sending; });
         const Time until = Clock::now() + settings_.answer_timeout;
-        for (bool answered = !link.sending; answered && Clock::now() < until;) {
+        for (bool answered = true; answered && Clock::now() < until;) {
             (void)skip_waiting_states();
-            answered = !link.disconnected && is_answered(0.0);
+            answered = is_answered(0.0);
             if (answered && reports_zero_force()) {
                 return ZeroForce::Confirmed;
             }
         }
-        return link.disconnected || link.sending ? ZeroForce::NotSent : ZeroForce::Sent;
+        return link_->socket.is_open() ? ZeroForce::Sent : ZeroForce::NotSent;
     }
 
     /// Returns true if the newest message of the service is a state of this device without a force.

@@ -8,20 +8,15 @@
 #include <string>
 #include <utility>
 
+#include "palpate/device/inverse3.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/fields/value.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/render.hpp"
 
-#ifdef PALPATE_HAS_INVERSE3
-#include "palpate/device/inverse3.hpp"
-#endif
-
-// Definition of open_inverse3. Boost.Beast takes long to compile.
+// Definition of open_inverse3. nlohmann-json takes long to compile.
 namespace palpate {
-
-#ifdef PALPATE_HAS_INVERSE3
 
 PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& options,
                                                          const PlannedModel& model) {
@@ -79,15 +74,5 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& op
                       {"service", filters}};
     return live;
 }
-
-#else
-
-PALPATE_INLINE std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& options,
-                                                         const PlannedModel& /*model*/) {
-    refuse("device " + options.device +
-           ": palpate was built without Boost; install libboost-dev and build palpate again");
-}
-
-#endif
 
 }  // namespace palpate
