@@ -147,7 +147,7 @@ def identify(
     with one_thread():
         network = _identified(recordings, fitted, settings, object_of)
         for drop in () if sections else (_drop_wrong_readings, _drop_first_strokes):
-            if (findings := drop(network, informative)) is not None:
+            if network.shows_all(recordings) and (findings := drop(network, informative)) is not None:
                 fitted = recordings = informative.recordings
                 network = _identified(recordings, fitted, settings, object_of)
                 if findings:  # behind rows that are left out, the strokes that follow are the first ones
@@ -158,11 +158,10 @@ def identify(
     unused = [unused_rows(rows.roles)] if network.memory is None and not rows.fitted.all() else []
     network.log.rows[:0] = [*informative.notes, *unused, *sections]
     source = Source.merged(part.source for part in fitted)
-    every_row = len(rows.force) == sum(map(len, recordings))
-    attracts = settings.below == "linear"
-    verdict = verdict_of(network, recordings, rows.direction if every_row else None, attracts)
-    model = model_of(network, recordings[0].units, source, verdict)
     left_out = sum(map(len, recordings)) - len(rows.force)
+    attracts = settings.below == "linear"
+    verdict = verdict_of(network, recordings, None if left_out else rows.direction, attracts)
+    model = model_of(network, recordings[0].units, source, verdict)
     model.notes["roles"] = (
         role_counts(rows.roles) | informative.dropped | ({"left out": left_out} if left_out else {})
     )
@@ -176,15 +175,13 @@ def _drop_wrong_readings(network: FittedNetwork, informative: Informative) -> li
     """Drops rows whose residual is that of a wrong reading; returns None if there are none."""
     # Rows behind a turn with a small weight share an error: none of them is wrong alone.
     counted = network.errors.share * network.errors.residual
-    whole = len(counted) == sum(map(len, informative.recordings))
-    return [] if whole and informative.drop_wrong_readings(counted) else None
+    return [] if informative.drop_wrong_readings(counted) else None
 
 
 def _drop_first_strokes(network: FittedNetwork, informative: Informative) -> list[Finding] | None:
     """Drops the first strokes over their places if they differ perceptibly from the later ones, which show
     what the object is from then on, and returns the finding on it; None if they do not differ."""
-    whole = len(network.errors.residual) == sum(map(len, informative.recordings))
-    if network.memory is not None or not whole:
+    if network.memory is not None:
         return None
     judged = judged_network(network, network.rows)
     if judged.cause is None or (first := first_strokes(judged)) is None:

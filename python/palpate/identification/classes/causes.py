@@ -102,6 +102,11 @@ class Judged:
     """True if the hysteresis must not be below 0"""
 
     @cached_property
+    def strokes(self) -> _Strokes | None:
+        """Rows of strokes in recorded order; None without strokes."""
+        return _Strokes.of(self)
+
+    @cached_property
     def cause(self) -> Cause | None:
         """Cause of what differs between strokes over the same place; None if no cause lowers BIC."""
         return _cause_of(self)
@@ -263,7 +268,7 @@ def first_strokes(best: Judged) -> NDArray[np.bool_] | None:
     from a later one in the same direction; None if another cause explains the difference."""
     if best.cause is None or best.cause.by != FIRST or not best.cause.perceptible:
         return None
-    strokes, first = _Strokes.of(best), np.zeros(len(best.weight), dtype=bool)
+    strokes, first = best.strokes, np.zeros(len(best.weight), dtype=bool)
     assert strokes is not None
     again = strokes.again(wholly=False)
     # A stroke mostly over new places is a first one also at those that it has in part in common.
@@ -281,7 +286,7 @@ def _cause_of(best: Judged) -> Cause | None:
     causes.
     """
     data = best.data
-    if len(data.names) > 1 or data.repeats is not None or (strokes := _Strokes.of(best)) is None:
+    if len(data.names) > 1 or data.repeats is not None or (strokes := best.strokes) is None:
         return None
     root, way_of_row = np.sqrt(strokes.share), strokes.group // PLACES
     way = way_of_row[strokes.first]

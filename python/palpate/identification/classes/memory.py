@@ -365,7 +365,7 @@ def _with_memory(
     if choice.shape is None:
         return "no branch lowers the criterion"
     compared = _Compared.of(found, recorded)
-    moved = _moved_zero(found, recordings)
+    moved = judged_network(found, found.rows).changed if found.shows_all(recordings) else 0.0
     before = max(compared.rmse**2 - moved, TINY) / recorded.spread**2
     in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
@@ -460,13 +460,6 @@ def _with_memory(
     return network
 
 
-def _moved_zero(found: FittedNetwork, recordings: Sequence[Recording]) -> float:
-    """Returns the mean square of the force [force^2] that a zero or an object that changes explains; 0 if
-    some rows have no residual, such as those at gaps of time."""
-    whole = len(found.errors.residual) == sum(map(len, recordings))
-    return judged_network(found, found.rows).changed if whole else 0.0
-
-
 def _branches(recorded: Recorded, shape: Shape) -> Iterator[str]:
     """Yields notes on the time constants and yield stretches of a memory, and on those that the recordings
     resolve."""
@@ -541,8 +534,7 @@ class _Compared:
             speed, known = (recorded.fitted(list(each)) for each in zip(*velocities(parts), strict=True))
             share, outside = known.astype(float), np.zeros(len(force))
             residual = force - found.force(np.column_stack([position, speed]), None)
-        elif len(errors.residual) != ends[-1]:
-            # some rows have no residual, such as those at gaps of time
+        elif not found.shows_all(parts):
             whole = np.array(1.0)
             return cls(balance, whole, whole, _rms(errors.residual, errors.share), errors.settled_rmse)
         else:

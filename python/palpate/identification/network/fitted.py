@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -129,6 +130,10 @@ class FittedNetwork:
         if self.memory is not None:
             law |= {"below": self.below, "above": self.above, "memory": self.memory}
         return ForceModel(**law, period=period)
+
+    def shows_all(self, recordings: Iterable[Sized]) -> bool:
+        """True if every row of the recordings has a residual; rows at gaps of time can have none."""
+        return len(self.errors.residual) == sum(map(len, recordings))
 
     def fit(self) -> Fit:
         """Returns the model class and the tested networks, in the form of a model file."""
