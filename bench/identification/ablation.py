@@ -280,7 +280,7 @@ RULES = (
     Rule("velocity needs a part of the residual", f"{CLASSES}.dynamics", "Dynamics.share_of_velocity", _one),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
     Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
-    Rule("memory explains more than a zero that moves", f"{CLASSES}.memory", "_moved_zero", lambda *_: 0.0),
+    Rule("terms explain more than an object that changes", f"{CLASSES}.causes", "Judged.changed", 0.0),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_residual", lambda of: of.best.residual),
     *map(without_check, checks.CHECKS),
