@@ -25,7 +25,6 @@ from ..data.strokes import (
 )
 from ..log import Decision, causes_of_crossing
 from ..network.basis import Basis
-from ..network.constraints import impose
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Samples, on_fitted_rows
 from .class_selection import ClassSelection, straight_line
@@ -33,7 +32,7 @@ from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
 """Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
-above which a finding names a cure [-]; up to this ratio, the error with h <= 0 shows exchanged strokes."""
+above which a finding names a cure [-]."""
 
 FIRST_MAX_WAVELETS = 4
 """Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
@@ -226,37 +225,14 @@ class Hysteresis:
         return found if selection.judge.accepts(line, found) else line
 
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
-        """Reports a cure if the constraint h >= 0 raises the error much: the opposite sign of a column, or no
-        constraint."""
-        if (
-            kept.rmse <= REPORTED_ERROR_RATIO * free.rmse
-            or best.rmse <= USABLE_NRMSE * self._selection.spread
-        ):
-            return
+        """Reports causes and cures if the constraint h >= 0 raises the error much."""
         spread = self._selection.spread
+        if kept.rmse <= REPORTED_ERROR_RATIO * free.rmse or best.rmse <= USABLE_NRMSE * spread:
+            return
         where = self._selection.above_press(free) or "on a part of the loop"
         cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
-        turned = self._turned_rmse(free)
-        if turned <= REPORTED_ERROR_RATIO * free.rmse:
-            cure = (
-                f"with the opposite sign of the recorded force the NRMSE is {turned / spread:.3g}. Press and "
-                "release may be exchanged: give --negate force or --negate position"
-            )
-        else:
-            cure = (
-                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}); "
-                f"{causes_of_crossing(bool(self._selection.data.parts))}"
-            )
-        sentence = f"hysteresis gains energy: {where} ({cost}); {cure}"
-        self._selection.log.findings[:] = [usable(sentence)]
-
-    def _turned_rmse(self, free: Candidate) -> float:
-        """Returns the RMS error with the constraint h <= 0, which is h >= 0 for the opposite sign of the
-        force."""
-        if free.problem.dimension > 1:
-            return math.inf
-        turned = replace(free.problem, readout=free.problem.readout * np.array([[1.0], [-1.0]]))
-        return turned.rmse(impose(turned, free.solution, self._selection.bounds(turned)))
+        causes = causes_of_crossing(bool(self._selection.data.parts))
+        self._selection.log.findings[:] = [usable(f"hysteresis gains energy: {where} ({cost}); {causes}")]
 
 
 class PlaySearch:

@@ -342,18 +342,9 @@ def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> Non
     assert network.errors.nrmse > 0.3
     (sentence,) = sign_findings(network)
     assert "--no-hysteresis-nonnegative" in sentence
-    assert "--negate" not in sentence
     cured = fit_environment(positions, force, side, IdentifyOptions(hysteresis_nonnegative=False))
     assert cured.errors.nrmse < 0.01
     assert sign_findings(cured) == []
-
-
-def test_negate_is_suggested_only_if_the_opposite_sign_helps() -> None:
-    positions, force, side = loop(-0.2 - 0.3 * np.linspace(0.0, 1.0, 300))
-    (sentence,) = sign_findings(fit_environment(positions, force, side))
-    assert "--negate force" in sentence
-    assert "--no-hysteresis-nonnegative" not in sentence
-    assert fit_environment(positions, -force, side).errors.nrmse < 0.01
 
 
 def test_wavelet_limit_is_reported_if_the_error_is_structured() -> None:
