@@ -203,10 +203,6 @@ MOST_LIBRARY_ENTRIES = 2**25
 """Largest number of stored values of all candidate wavelets at all rows, 128 MiB for each channel of a row.
 Many rows allow fewer candidates."""
 
-NEGLIGIBLE_SHARE = 1e-14
-"""The sum of products of Fourier transforms for the frame bounds ends at a product below this share of the
-largest one [-]: further ones cannot change a printed digit."""
-
 
 def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     """Estimates the frame bounds A, B of the unit-norm Mexican hat psi (Daubechies 1990, section II.C).
@@ -250,8 +246,8 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     for stretch in 2.0 ** (-np.arange(voices) / voices):
         here = _spectrum(frequency / stretch)
         diagonal += (here * here).sum(axis=1)
-        shift, first = 1, 0.0
-        while True:
+        shift, overlap = 1, 1.0
+        while overlap > 0.0:
             step = 2.0 * np.pi * shift / b0
             # the Fourier transform is even: the supremum over -xi at +s equals the one over xi at -s, so both
             # factors of the product are equal
@@ -260,9 +256,6 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
                 for sign in (1, -1)
             )
             cross += 2.0 * overlap
-            first = max(first, overlap)
-            if overlap <= NEGLIGIBLE_SHARE * first or overlap < np.finfo(float).tiny:
-                break
             shift += 1
     unit = 2.0 * np.pi / b0
     return float(unit * (diagonal.min() - cross)), float(unit * (diagonal.max() + cross))
