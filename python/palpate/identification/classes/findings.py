@@ -387,7 +387,6 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             nrmse=error.nrmse,
             left_out_nrmse=replace(error, residual=left_out).nrmse,
             settled_nrmse=(settled.nrmse, replace(settled, residual=left_out).nrmse),
-            settled_rmse=best.settled.rmse,
             rows=int(np.count_nonzero(error.weight)),
             correlation=neighbour_correlation(
                 best.residual[(best.error_on(None).weight > 0.0) | ~data.fitted]

@@ -439,7 +439,6 @@ def _with_memory(
             nrmse,
             left_out_nrmse,
             settled_nrmse=(nrmse, left_out_nrmse),
-            settled_rmse=of_all,
             rows=len(of_rows),
             residual=of_rows,
             share=np.ones(len(of_rows)),
@@ -535,8 +534,8 @@ class _Compared:
             share, outside = known.astype(float), np.zeros(len(force))
             residual = force - found.force(np.column_stack([position, speed]), None)
         elif not found.shows_all(parts):
-            whole = np.array(1.0)
-            return cls(balance, whole, whole, _rms(errors.residual, errors.share), errors.settled_rmse)
+            whole, rmse = np.array(1.0), _rms(errors.residual, errors.share)
+            return cls(balance, whole, whole, rmse, rmse)
         else:
             residual, share = (
                 recorded.fitted(np.split(each, ends[:-1])) for each in (errors.residual, errors.share)

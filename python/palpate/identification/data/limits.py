@@ -21,10 +21,6 @@ LEAST_GAIN = 0.25
 these forces are harder to render and to certify. A longer period must explain it too: a straight line over
 the travel, taken modulo at most half of it, explains no more."""
 
-PROBED_ROWS = 7
-"""Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
-whole table is searched for repeated rows."""
-
 LEAST_LEVELS = 3
 """A force step is computed only for at least this number of distinct force values."""
 
@@ -100,8 +96,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
     copies: a file joined from copies of one recording has the same number of copies of each row."""
     columns = [*positions.T, force] if side is None else [*positions.T, force, side]
     again = np.zeros(len(force), dtype=bool)
-    probes = np.linspace(0, len(force) - 1, PROBED_ROWS).astype(np.intp)
-    if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
+    if 2 * len(np.unique(force)) <= len(force):  # sorting all columns takes longer
         chosen, _, count = distinct_rows(np.column_stack(columns))
         usual = int(np.median(count))
         if usual > 1 and np.mean(count == usual) > LEAST_EQUAL_REPEATS:

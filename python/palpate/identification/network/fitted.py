@@ -33,8 +33,6 @@ class Errors:
     """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
     settled_nrmse: tuple[float, float] = (0.0, 0.0)
     """NRMSE on fitted and on left out rows, with their weights in the fit [-]"""
-    settled_rmse: float = 0.0
-    """RMS error on the fitted samples, with their weights in the fit [force]"""
     rows: int = 0
     """Number of fitted rows"""
     correlation: float = 0.0
@@ -46,8 +44,7 @@ class Errors:
 
     def unscaled(self, factor: float) -> Errors:
         """Returns the errors of forces that are divided by a factor."""
-        rmse, settled_rmse = self.rmse / factor, self.settled_rmse / factor
-        return replace(self, rmse=rmse, settled_rmse=settled_rmse, residual=self.residual / factor)
+        return replace(self, rmse=self.rmse / factor, residual=self.residual / factor)
 
 
 @dataclass(frozen=True)
