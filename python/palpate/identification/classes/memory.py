@@ -7,7 +7,6 @@ after each. Then the force at rest is identified as any force of position.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -52,14 +51,6 @@ MOST_RATIO_WAVELETS = 4
 
 GRID_PER_DECADE = 3
 """Number of time constants, or of yield stretches, in a decade that are tried for a new branch."""
-
-RESOLVED_RATIO = 1.5
-"""Least ratio of the largest time constant to the smallest one that the recordings resolve, and of the
-duration to the smallest time constant [-]. Faster branches cannot be distinguished from damping, slower ones
-from a zero that drifts."""
-
-LEAST_NRMSE = 0.005
-"""NRMSE of the model without memory below which a memory is not tested [-]."""
 
 LEAST_CORRELATION = 0.1
 """Correlation of the residuals of neighbouring rows below which a memory is not tested [-], two standard
@@ -319,9 +310,6 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
         return ""
     if found.inputs != VELOCITY_INPUTS:
         errors = found.errors
-        spread = errors.rmse / errors.nrmse if errors.nrmse else math.inf
-        if (nrmse := _rms(errors.residual, errors.share) / spread) < LEAST_NRMSE:
-            return f"the model without memory has an NRMSE of {nrmse:.2g}, below {LEAST_NRMSE:g}"
         every_second = 2 * errors.rows >= len(found.rows.force)
         upper = errors.correlation + 2.0 / np.sqrt(max(errors.rows, 1))
         if every_second and upper < LEAST_CORRELATION:
@@ -378,12 +366,6 @@ def _with_memory(
         return "no branch lowers the criterion"
     if len(refined.log_yield) == 1:
         return "one branch that slips is a play operator, as hysteresis has"
-    if recorded.ranges.log_tau is not None and not len(refined.log_yield):
-        shortest, longest = np.exp(recorded.ranges.log_tau)
-        if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
-            return f"the branches relax within {shortest:.2g} s, which the rows do not resolve"
-        if np.exp(refined.log_tau.min()) > longest / RESOLVED_RATIO:
-            return f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
     coefficients, stiffness = fit.solved(refined)
     network = replace(
         at_rest,
