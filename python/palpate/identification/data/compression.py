@@ -31,10 +31,6 @@ POOLED_CELLS = 4
 """Number of neighbouring position cells that share one slope of the force; with several inputs at least 2 per
 input."""
 
-SIDE_PARTS = 8
-"""Number of parts of the travel; in each part the slope of the force over the direction state is taken as
-constant."""
-
 LEAST_CELLS_PER_AXIS = 8
 """Least number of cells along each input. With fewer cells, rows are dropped instead of gathered in cells."""
 
@@ -134,8 +130,7 @@ class Compressor:
             dy = _without_slopes(dy, dx, block, weight)
             ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds
         if ds.any():
-            part, _ = _ranked(cell * SIDE_PARTS // (int(cell.max()) + 1), weight)
-            dy = _without_slopes(dy, ds[:, None], part, weight)
+            dy = _without_slopes(dy, ds[:, None], np.zeros_like(key), weight)
         within += float(dy @ (weight * dy))
         samples = float(weight.sum())
         scatter = float(weight @ dx[:, 0] ** 2) / samples
