@@ -36,8 +36,8 @@ STEP_ERROR = 1.0 / 3.0
 rounding errors have 1/sqrt(12)"""
 
 LEAST_NOISE_EVENNESS = 0.8
-"""Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
-as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
+"""Least ratio of the median to the RMS of residuals, 1 for normal noise, at which they are noise [-].
+Residuals of an unfitted force are large at a few positions and small at others."""
 
 LEAST_INDEPENDENT_SHARE = 0.02
 """Least share of the rows that count as independent if the noise of successive rows is correlated [-]. With a

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..._core.model import most_wavelets
 from ..._typing import Float1D
 from ...recording.motion import FORCE_RESOLUTION
+from ..data.limits import LEAST_NOISE_EVENNESS
 from ..log import PathPoint
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.separable import (
@@ -38,10 +39,6 @@ tried [penalty of one wavelet]. Refinement seldom recovers a larger rise."""
 
 LEAST_CORE_POSITIONS = 5
 """Least number of distinct positions in a wavelet's core if the residuals are not noise."""
-
-LEAST_NOISE_EVENNESS = 0.5
-"""Least ratio of the median to the RMS of the residuals, scaled to 1 for normal noise, at which uncorrelated
-residuals are taken as noise [-]. Narrower wavelets are then not tried."""
 
 FINER_ERROR_RATIO = 4.0
 """Narrower wavelets that the criterion does not accept are still accepted if they divide the RMS error by
