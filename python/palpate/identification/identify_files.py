@@ -43,7 +43,7 @@ from ..verdict import usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.rows import Rows, modulo, require_in_range
-from .data.strokes import DIRECTION_CURE, LEAST_KNOWN_SHARE
+from .data.strokes import DIRECTION_CURE
 from .fit import fit_rows
 from .identify import model_of
 from .log import Decision, Log, in_words
@@ -310,7 +310,7 @@ def _identified(
 def _known_strokes(summary: Summary) -> bool:
     """True if both directions occur and most rows have a direction."""
     press, release = (float(summary.count[summary.side == side].sum()) for side in (1, -1))
-    return min(press, release) > 0.0 and press + release >= LEAST_KNOWN_SHARE * summary.rows
+    return min(press, release) > 0.0 and 2.0 * (press + release) >= summary.rows
 
 
 def _require_summable(settings: IdentifyOptions) -> None:

@@ -17,7 +17,6 @@ from ...errors import InputError
 from ...verdict import usable
 from ..data.limits import evenly_spread
 from ..data.strokes import (
-    LEAST_KNOWN_SHARE,
     HysteresisInput,
     settled_rows,
     turns_before,
@@ -295,10 +294,8 @@ class PlaySearch:
     @cached_property
     def _usable(self) -> list[HysteresisInput]:
         """Direction states of the rows for each tried play radius, the smallest radius first; without radii
-        at which too few rows, or rows of one stroke only, have a known direction state."""
-        tried = [self._of(radius) for radius in self._radii]
-        fitted = self._samples.data.fitted
-        return [one for one in tried if one.known[fitted].mean() >= LEAST_KNOWN_SHARE and one.both_ways]
+        at which rows of one stroke only have a known direction state."""
+        return [one for one in map(self._of, self._radii) if one.both_ways]
 
     def _residual_squares(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
         """Returns the residual sum of squares of the best weights on given wavelets, over the rows `known`.

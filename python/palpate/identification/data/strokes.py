@@ -22,9 +22,6 @@ from ..log import Decision, Log
 TRAVEL_CELLS = 32
 """Number of cells of the travel in which press force and release force are compared."""
 
-LEAST_KNOWN_SHARE = 0.5
-"""Hysteresis is tested only if the direction state of at least this share of the rows is known [-]."""
-
 LEAST_MEAN_DIFFERENCE = 0.05
 """Least mean force difference of two recordings for press and release [standard deviations of the force].
 Repeated measurements of one stroke differ by at most 0.02."""
