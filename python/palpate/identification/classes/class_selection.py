@@ -148,10 +148,6 @@ class ClassSelection:
         kept = impose(problem, candidate.solution, bounds)
         if kept is candidate.solution:
             return candidate
-        if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
-            # If the constraints of a periodic model raise the error, equal slopes of its ends are dropped.
-            bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
-            kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
         if worse and len(kept.basis) and not all(bound.seam for bound in bounds):
             rows = self.samples.rows(candidate.strokes)

@@ -107,15 +107,14 @@ def domain_bounds(
     and release g - h.
 
     `fixed` is (position [box], force): the mean force g goes through this point, by an upper and a lower
-    bound. With `periodic`, g (and h) and their slopes are equal at both ends of the domain.
+    bound. With `periodic`, g (and h) are equal at both ends of the domain.
     """
     two = len(problem.readout) == 2
     bounds = []
     if periodic:
         bounds += [
-            Bound(part, of_slope, "equal ends of the period", sign, 0.0, 0.0, seam=True)
+            Bound(part, False, "equal ends of the period", sign, 0.0, 0.0, seam=True)
             for part in ([(1.0, 0.0), (0.0, 1.0)] if two else [(1.0,)])
-            for of_slope in (False, True)
             for sign in (1.0, -1.0)
         ]
     if fixed is not None:
