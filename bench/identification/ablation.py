@@ -41,6 +41,7 @@ import palpate
 from palpate import InputError, Model, Recording
 from palpate._core.model import play
 from palpate.baselines import comparable
+from palpate.identification.classes.causes import _Strokes
 from palpate.recording import checks
 from palpate.recording.checks import Check
 from palpate.recording.motion import strokes_from_order, velocity, waits
@@ -58,7 +59,7 @@ LOST = (0.3, 0.6)
 
 SHOWN = (
     *(10199, 10206, 10229, 10236, 10261, 10280, 10323, 10363, 10382, 10388, 10441, 10908, 10952, 11611),
-    *(13951, 14318),
+    *(13951, 14318, 14392, 14686),
 )
 """Draws that show a rule which other draws seldom show"""
 
@@ -182,6 +183,10 @@ def _moves(path: Any, order: Any, distance: float) -> Any:
     return order != 0.0
 
 
+def _in_part(strokes: Any, wholly: bool, again: Any = _Strokes.again) -> Any:
+    return wholly | again(strokes, wholly=False)
+
+
 def _whole(path: Any, *_: Any) -> Any:
     return np.ones(len(path))
 
@@ -256,6 +261,7 @@ RULES = (
     Rule("rows of a slower sensor", f"{CHECKS}.wrong_readings", "_rows_held", _one),
     Rule("residuals show wrong readings", "identification.identify", "Informative", OfForces),
     Rule("first strokes that differ are not fitted", "identification.identify", "first_strokes", _nothing),
+    Rule("stroke mostly over new places is a first one", f"{CLASSES}.causes", "_Strokes.again", _in_part),
     Rule("other strokes show errors of the model", f"{CHECKS}.wrong_readings", "_of_other_strokes", _zeros),
     Rule("waits are judged by time", "recording.conversion", "waits", lambda x, time=None: waits(x)),
     Rule("play follows over a gap", f"{DATA}.rows", "ordered_strokes", _nothing),
@@ -273,6 +279,7 @@ RULES = (
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),
     Rule("rows next to turns of a tool that leaves", f"{DATA}.strokes", "NEXT_TO_TURN", 0),
+    Rule("weights in the stated error", f"{CLASSES}.findings", "_judged_error", lambda best, share: best.error),
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
     Rule("velocity needs a part of the residual", f"{CLASSES}.dynamics", "Dynamics.share_of_velocity", _one),

@@ -45,7 +45,7 @@ def test_rows_that_wait_change_the_fit_if_they_are_fitted() -> None:
     without = row["without"]["rows that wait are not fitted"]
     assert changed(row["all"], without)
     assert without["error"] > 5.0 * row["all"]["error"]
-    assert not changed(row["all"], row["without"]["no finer than repeats"])
+    assert not changed(row["all"], row["without"]["harmonics"])
 
 
 def test_a_rule_with_the_same_values_in_every_call_is_not_switched_off(
@@ -84,7 +84,7 @@ def test_the_judgement_of_a_model_uses_every_rule() -> None:
 def test_the_study_prints_each_rule_and_writes_its_results(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    printed = [NAMED[name] for name in ("pruning", "repeated rows are dropped", "no finer than repeats")]
+    printed = [NAMED[name] for name in ("pruning", "repeated rows are dropped", "check of drift")]
     rules = (*printed, *(rule for rule in RULES if rule not in printed))[:number]
     monkeypatch.setattr(ablation, "RULES", rules)
     monkeypatch.delenv("PALPATE_DATA", raising=False)
@@ -99,4 +99,4 @@ def test_the_study_prints_each_rule_and_writes_its_results(
     assert changes["pruning"] > changes["repeated rows are dropped"] == 1
     table = capsys.readouterr().out
     assert f"| pruning | {changes['pruning']} |" in table
-    assert "| no finer than repeats | no change |" in table
+    assert "| check of drift | no change |" in table
