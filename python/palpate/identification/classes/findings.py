@@ -299,9 +299,10 @@ def _first_contact(best: Candidate, near_zero: float, into: float) -> float:
 
 def limit_findings(best: Candidate, judged: Judged, limit: int) -> list[Finding]:
     """Returns a finding if growth ended at `limit` wavelets although neighbouring residuals are still
-    correlated, and a hand feels the error at some place."""
-    structured = best.stop_reason == "max_wavelets" and best.problem.structured(best.solution)
-    if not structured or not place_findings(judged):
+    correlated, and a hand feels the error."""
+    if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
+        return []
+    if best.error.rmse <= judged.floor and not place_findings(judged):
         return []
     return [
         usable(

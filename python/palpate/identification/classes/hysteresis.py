@@ -214,7 +214,11 @@ class Hysteresis:
         where = self._selection.above_press(free) or "on a part of the loop"
         cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
         causes = causes_of_crossing(bool(self._selection.data.parts))
-        self._selection.log.findings[:] = [usable(f"hysteresis gains energy: {where} ({cost}); {causes}")]
+        sentence = (
+            f"hysteresis gains energy: {where} ({cost}); if a sign is reversed, give --negate force or "
+            f"--negate position; {causes}"
+        )
+        self._selection.log.findings[:] = [usable(sentence)]
 
 
 class PlaySearch:
