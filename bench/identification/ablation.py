@@ -279,7 +279,7 @@ RULES = (
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),
     Rule("rows next to turns of a tool that leaves", f"{DATA}.strokes", "NEXT_TO_TURN", 0),
-    Rule("weights in the stated error", f"{CLASSES}.findings", "_judged_error", lambda best, share: best.error),
+    Rule("weights in the stated error", f"{CLASSES}.findings", "_judged_error", lambda best, _: best.error),
     Rule("weights of rows behind turns settle", f"{CLASSES}.hysteresis", "REWEIGHTINGS", 1),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
     Rule("velocity needs a part of the residual", f"{CLASSES}.dynamics", "Dynamics.share_of_velocity", _one),
