@@ -517,19 +517,6 @@ def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
     assert verify(without_waits(), replace(recording, direction=hold.astype(np.int8))).n == 260
 
 
-def test_waits_of_a_model_with_memory_are_compared() -> None:
-    time = np.arange(3000) * 4e-3
-    x = np.interp(time, [0.0, 0.5, 4.5, 5.0, 6.0, 8.0, 12.0], [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
-    f = np.zeros(len(x))
-    for row in range(1, len(x)):
-        f[row] = f[row - 1] * np.exp(-4e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
-    f += 2.0 * x + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
-    recording = Recording.from_arrays(x, f, time, units=RAD)
-    model = identify(recording)
-    assert model.memory is not None
-    assert verify(model, recording).n == len(x)
-
-
 def contact_model(memory: bool, **change: Any) -> Model:
     """Returns a model of force 2 x that the tool leaves at x = 0, with a branch of stiffness 3 if
     requested."""
@@ -549,6 +536,14 @@ def contacts(memory: bool, wait_s: float = 1.0, shift: float = 0.0) -> Recording
     force = model.force_over_time(time, x)[0] if memory else model.force(x)
     force += np.random.default_rng(1).normal(0.0, 2e-3, len(x))
     return Recording.from_arrays(x + shift, force, time, units=RAD)
+
+
+def test_waits_of_a_model_with_memory_are_compared() -> None:
+    time = np.arange(3000) * 4e-3
+    x = np.interp(time, [0.0, 0.5, 4.5, 5.0, 6.0, 8.0, 12.0], [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    model = contact_model(memory=True)
+    f = model.force_over_time(time, x)[0] + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
+    assert verify(model, Recording.from_arrays(x, f, time, units=RAD)).n == len(x)
 
 
 @pytest.mark.parametrize("memory", [False, True])

@@ -413,10 +413,10 @@ def test_an_acceleration_near_the_sampling_rate_keeps_its_amplitude() -> None:
 def driven(seed: int, friction: float) -> Recording:
     """Returns a soft centring spring with inertia, damping and friction, shaken at up to 7 Hz."""
     random = np.random.default_rng(seed)
-    t = np.arange(2000) / 500.0
+    t = np.arange(1000) / 250.0
     waves = zip((0.5, 2.8, 7.0), (0.8, 0.15, 0.06), random.uniform(0.0, 6.0, 3), strict=True)
     x = np.sum([size * np.sin(2.0 * np.pi * rate * t + phase) for rate, size, phase in waves], axis=0)
-    force = 3.0 * np.tanh(x / 0.8) + 0.12 * np.gradient(x, t) + 0.045 * acceleration_of(x, 0.002)
+    force = 3.0 * np.tanh(x / 0.8) + 0.12 * np.gradient(x, t) + 0.045 * acceleration_of(x, 0.004)
     force += friction * np.clip((x - play(x, 0.01)) / 0.01, -1.0, 1.0)
     force += random.normal(0.0, 0.03, len(x))
     return Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=t)
