@@ -46,9 +46,6 @@ relaxation test determine the force at rest between its positions."""
 MOST_BRANCHES = 6
 """Largest number of branches; the core allows 8."""
 
-MOST_RATIO_WAVELETS = 4
-"""Largest number of wavelets in the ratio."""
-
 GRID_PER_DECADE = 3
 """Number of time constants, or of yield stretches, in a decade that are tried for a new branch."""
 
@@ -125,13 +122,12 @@ def _larger(now: Choice, recorded: Recorded, relaxes: bool) -> Iterator[Choice]:
         return
     if not shape.sloped and not len(shape.wavelets):
         yield best(replace(shape, sloped=True, slope=c) for c in (-1.0, 1.0))
-    if len(shape.wavelets) < MOST_RATIO_WAVELETS:
-        yield best(
-            replace(shape, wavelets=np.vstack([shape.wavelets, [weight, beta, np.log(alpha)]]))
-            for weight in (-0.5, 0.5)
-            for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
-            for alpha in (1.5, 4.0, 10.0)
-        )
+    yield best(
+        replace(shape, wavelets=np.vstack([shape.wavelets, [weight, beta, np.log(alpha)]]))
+        for weight in (-0.5, 0.5)
+        for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
+        for alpha in (1.5, 4.0, 10.0)
+    )
 
 
 def _grid(least: float, most: float) -> Float1D:
