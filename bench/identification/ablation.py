@@ -179,10 +179,6 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
-def _moves(path: Any, order: Any, distance: float) -> Any:
-    return order != 0.0
-
-
 def _in_part(strokes: Any, wholly: bool, again: Any = _Strokes.again) -> Any:
     return wholly | again(strokes, wholly=False)
 
@@ -274,7 +270,7 @@ RULES = (
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
-    Rule("radius of strokes without reversals", f"{CLASSES}.hysteresis", "settled_rows", _moves),
+    Rule("radius of strokes without reversals", f"{CLASSES}.hysteresis", "PlaySearch.settled", _second),
     Rule("largest radius needs turns apart", f"{CLASSES}.hysteresis", "PlaySearch._turns_apart", _one),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("rows behind turns share an error", f"{DATA}.strokes", "weights_behind_turns", _whole),

@@ -18,7 +18,6 @@ from ...verdict import usable
 from ..data.limits import evenly_spread
 from ..data.strokes import (
     HysteresisInput,
-    settled_rows,
     turns_before,
     weights_of_shared_errors,
 )
@@ -235,8 +234,10 @@ class PlaySearch:
 
     def settled(self, order: HysteresisInput) -> HysteresisInput:
         """Returns the directions of the rows behind reversals."""
-        fitted = order.side * self._samples.data.fitted
-        return replace(order, known=settled_rows(self._path, fitted, self._reversal))
+        moving, stroke, turns = turns_before(order.side * self._samples.data.fitted)
+        settled = np.zeros(len(self._path), dtype=bool)
+        settled[moving] = np.abs(self._path[moving] - self._path[turns][stroke]) > self._reversal
+        return replace(order, known=settled)
 
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
         """Returns the direction states for each play radius of the options at which the error on given

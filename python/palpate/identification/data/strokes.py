@@ -232,17 +232,6 @@ def turns_before(order: Float1D) -> tuple[NDArray[np.intp], NDArray[np.intp], ND
     return moving, np.cumsum(begins) - 1, moving[np.maximum(np.flatnonzero(begins) - 1, 0)]
 
 
-def settled_rows(path: Float1D, order: Float1D, distance: float) -> NDArray[np.bool_]:
-    """Returns True (n,) for rows of a stroke that are further behind its turn than a distance [travel].
-
-    `path` (n,) holds positions in recorded order [travel], `order` (n,) directions, 0 for rows of no stroke.
-    """
-    moving, stroke, turns = turns_before(order)
-    settled = np.zeros(len(path), dtype=bool)
-    settled[moving] = np.abs(path[moving] - path[turns][stroke]) > distance
-    return settled
-
-
 def weights_behind_turns(
     path: Float1D, order: Float1D, residual: Float1D, touched: NDArray[np.bool_], least: float
 ) -> Float1D:
