@@ -70,10 +70,10 @@ LEAST_MOMENT = 1e-6
 errors"""
 
 
-def places_of(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
+def places_of(box: Float2D, side: NDArray[Any] | None, places: int = PLACES) -> NDArray[np.intp]:
     """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
-    place = np.minimum((box[:, 0] * PLACES).astype(np.intp), PLACES - 1)
-    return place if side is None else place + PLACES * (side < 0)
+    place = np.minimum((box[:, 0] * places).astype(np.intp), places - 1)
+    return place if side is None else place + places * (side < 0)
 
 
 def means_at(place: NDArray[np.intp], weight: Float1D, *values: Float1D) -> list[Float1D]:
@@ -161,9 +161,12 @@ class _Strokes:
     """Rows of strokes, to compare those in the same direction over the same place.
 
     The mean of the rows of a stroke at a place counts once: the rows of a slow stroke are not independent.
+    A stroke has a row in each place on average: two strokes have no narrower places in common.
     """
 
     best: Judged
+    places: int
+    """Number of places of the travel"""
     rows: NDArray[np.intp]
     """(k,) indices of the rows with a weight"""
     weight: Float1D
@@ -182,19 +185,23 @@ class _Strokes:
     @classmethod
     def of(cls, best: Judged) -> _Strokes | None:
         """Returns the rows of strokes in recorded order; None without strokes."""
-        if (direction := strokes_from_order(best.data.path[:, 0])) is None:
+        x = best.data.path[:, 0]
+        if (direction := strokes_from_order(x)) is None:
             return None
         every = np.flatnonzero(direction)
         edges = np.flatnonzero(np.diff(direction[every], prepend=0))
         rows = np.flatnonzero((best.weight > 0.0) & (direction != 0))
         number = np.searchsorted(every[edges], rows, side="right") - 1
         ends = np.append(edges[1:], len(every)) - 1
-        group = places_of(best.data.box[rows], direction[rows])
+        distance = np.minimum(np.abs(x[every[ends]] - x[every[edges]]), 1.0)
+        places = int(min(PLACES, max(1.0, len(rows) / distance.sum())))
+        group = places_of(best.data.box[rows], direction[rows], places)
         return cls(
             best,
+            places,
             rows,
             best.weight[rows],
-            np.unique(number * 2 * PLACES + group, return_inverse=True)[1],
+            np.unique(number * 2 * places + group, return_inverse=True)[1],
             group,
             number,
             every[edges][number],
@@ -221,7 +228,7 @@ class _Strokes:
                 speed = np.abs(moving)
                 yield FASTER, speed, float(np.ptp(speed)), [speed, np.abs(friction_sign(moving))]
         ends = x[self.begin], x[np.maximum(self.begin - 1, 0)]  # before and behind the turn
-        press = self.group < PLACES
+        press = self.group < self.places
         turn = np.where(press, np.minimum(*ends), np.maximum(*ends))
         moved = [float(np.ptp(self.centred(turn * side))) for side in (press, ~press)]
         turn = turn * np.where(press, *(each > TURN_SHARE for each in moved))
@@ -235,9 +242,9 @@ class _Strokes:
         data = self.best.data
         x = data.path[:, 0]
         low, high = np.minimum.accumulate(x)[self.begin], np.maximum.accumulate(x)[self.begin]
-        place = np.rint(x - data.box[:, 0])[self.rows] * PLACES + self.group % PLACES
+        place = np.rint(x - data.box[:, 0])[self.rows] * self.places + self.group % self.places
         first, last = (place, place + 1.0) if wholly else (place + 1.0, place)
-        return np.asarray((low * PLACES <= first) & (last <= high * PLACES))
+        return np.asarray((low * self.places <= first) & (last <= high * self.places))
 
     @cached_property
     def first(self) -> NDArray[np.intp]:
@@ -288,7 +295,7 @@ def _cause_of(best: Judged) -> Cause | None:
     data = best.data
     if len(data.names) > 1 or data.repeats is not None or (strokes := best.strokes) is None:
         return None
-    root, way_of_row = np.sqrt(strokes.share), strokes.group // PLACES
+    root, way_of_row = np.sqrt(strokes.share), strokes.group // strokes.places
     way = way_of_row[strokes.first]
     force = (data.force - best.residual)[strokes.rows] / (np.abs(data.force).max() or 1.0)
     residual = root * strokes.centred(best.residual[strokes.rows])

@@ -225,6 +225,15 @@ def test_the_first_of_two_presses_is_not_fitted_if_it_is_stiffer(rows: int) -> N
     assert "rows are left out: the model is that of the later strokes" in reason
 
 
+def test_the_first_of_two_presses_of_few_rows_is_not_fitted_if_it_is_stiffer() -> None:
+    """No two rows are in the same hundredth of the travel."""
+    first, later = (np.sin(np.linspace(0.0, 0.5 * np.pi, rows)) ** 2 for rows in (25, 32))
+    x = np.r_[first, first[::-1], later, later[::-1]]
+    force = 10.0 * x * np.where(np.arange(len(x)) < 25, 1.2, 1.0)
+    model = palpate.identify(x, force + np.random.default_rng(0).normal(0.0, 0.02, len(x)))
+    assert model.force(0.5, direction=1.0) == pytest.approx(5.0, abs=0.1)
+
+
 def test_strokes_that_differ_by_their_speed_are_not_only_called_a_changed_object() -> None:
     """The strokes become faster, and velocity is not among the inputs."""
     x = np.concatenate([np.r_[np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)] for n in (200, 100, 50)])
