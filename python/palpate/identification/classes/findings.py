@@ -362,7 +362,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     judged = judged_candidate(best, options.hysteresis_nonnegative)
     # One cause of an error hides the others.
     shift_nrmse, of_shift, remarks = effect_of_shift(selection)
-    decisions += hidden_by_friction(best, decisions) if not (of_shift or remarks) else []
+    decisions += hidden_by_friction(best, decisions)
     findings += (
         of_shift
         or log.findings

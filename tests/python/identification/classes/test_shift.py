@@ -61,6 +61,7 @@ def test_the_error_contains_the_shift_that_a_hand_feels_and_its_line_and_the_ver
     assert found
     assert float(found[1]) == pytest.approx(shift, rel=0.5)
     assert "mount the object without backlash, or give --force-late-s" in message
+    assert "the loop of friction hides backlash" in str(model.notes["model_selection"])
 
 
 @pytest.mark.parametrize("seed", sampled(range(6), 0))
