@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chromium import PROGRAM, Page, chromium
+from chromium import MOST_TRIES, PROGRAM, Page, chromium
 from palpate.cli.main import main
 from palpate.recording.sample import sample_recording
 from test_report_page import TEXT_BEYOND_THE_WINDOW
@@ -30,8 +30,6 @@ WIDTHS = {"phone": 390, "desk": 1280}
 """Width of the window [px]"""
 
 HEIGHT = 900
-
-LONGEST_WAIT_S = 30.0
 
 FIGURE_WITH_HANDLES = """
 window.all = (view) => [view, ...(view.child_views ?? []).flatMap(all)];
@@ -81,11 +79,12 @@ class App:
     def download(self, kind: str, name: str) -> bytes:
         """Downloads a file and returns its content."""
         self.page.click(f"[data-download={kind}]")
-        deadline = time.monotonic() + LONGEST_WAIT_S
-        while not (file := self.downloads / name).exists():
-            assert time.monotonic() < deadline, self.text("message")
+        for _ in range(MOST_TRIES):
+            if (file := self.downloads / name).exists():
+                return file.read_bytes()
+            message = self.text("message")
             time.sleep(0.05)
-        return file.read_bytes()
+        raise AssertionError(message)
 
 
 @pytest.fixture(scope="module")
