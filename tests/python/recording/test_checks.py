@@ -405,6 +405,46 @@ def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
     assert zero_sentences(x, f) == []
 
 
+def cycles_with_signs(*signs: float, friction: float = 0.1) -> list[str]:
+    """Returns the sentences on strokes of a spring with friction, each stored with one of the signs."""
+    press = np.linspace(0.0, 4e-3, 300)
+    strokes = [press if number % 2 == 0 else press[::-1] for number in range(len(signs))]
+    force = [
+        sign * (500.0 * x + (friction if number % 2 == 0 else -friction))
+        for number, (sign, x) in enumerate(zip(signs, strokes, strict=True))
+    ]
+    noise = np.random.default_rng(0).normal(0.0, 2e-3, 300 * len(signs))
+    return zero_sentences(np.concatenate(strokes), np.concatenate(force) + noise)
+
+
+@pytest.mark.parametrize("wrong", range(4))
+def test_one_of_several_strokes_with_the_wrong_sign_is_named(wrong: int) -> None:
+    (sentence,) = cycles_with_signs(*(-1.0 if number == wrong else 1.0 for number in range(4)))
+    assert f"the {('press', 'release')[wrong % 2]} from row" in sentence
+    assert "have forces with opposite signs" in sentence
+    assert "zero of the force" not in sentence
+
+
+def test_friction_that_grows_with_the_position_in_two_cycles_is_not_a_wrong_sign() -> None:
+    assert cycles_with_signs(1.0, -1.0, 1.0, -1.0) == []
+    (sentence,) = cycles_with_signs(1.0, -1.0)
+    assert "the object has only friction, which grows with the position" in sentence
+
+
+def test_a_release_that_pulls_less_than_the_press_pushes_is_not_a_wrong_sign() -> None:
+    x, _ = contact()
+    f = np.r_[500.0 * x[:800], -100.0 * x[800:]]
+    assert not [each for each in zero_sentences(x, f) if "opposite sign" in each]
+
+
+def test_an_inertia_at_several_speeds_is_not_a_wrong_sign() -> None:
+    time = np.arange(0.0, 6.0, 2e-3)
+    phase = np.cumsum(2.0 * np.pi * 2e-3 * (1.0 + 0.4 * np.sin(2.7 * time)))
+    x = np.cos(phase)
+    f = 40.0 * x + np.gradient(np.gradient(x, time), time)
+    assert zero_sentences(x, f) == []
+
+
 def test_rows_that_wait_do_not_hide_a_second_zero() -> None:
     x, f = contact()
     f[800:] -= 0.24

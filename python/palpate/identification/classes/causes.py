@@ -52,8 +52,8 @@ TURNED = (
 FIRST_CURE = "Press the object several times before the recording, or leave out the first strokes with --rows"
 
 FIRST = (
-    "behind the first stroke over a position the force there {} by {}: the object or the zero of the force "
-    f"changed. {FIRST_CURE}"
+    "behind the first stroke over a position the force there {} by {}: the object, the zero of the force or "
+    f"its sign changed. {FIRST_CURE}"
 )
 """Sentence on a first stroke that differs from the later ones"""
 

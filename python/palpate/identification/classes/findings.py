@@ -71,7 +71,10 @@ def verdict_of(
     fitted, left_out = network.errors.settled_nrmse
     moving = network.damping is not None or network.memory is not None or "velocity" in network.inputs
     explained = moving and max(fitted, left_out) <= UNFIT_NRMSE
-    findings = [*findings_of(recordings, side, attracts, explained), *network.log.findings]
+    recorded = findings_of(recordings, side, attracts, explained)
+    if any(each.level == "no" for each in recorded):  # this cause of an error hides the others
+        return Verdict(tuple(dict.fromkeys(recorded)))
+    findings = [*recorded, *network.log.findings]
     rows = "rows that were left out of the fit" if left_out > fitted else "the rows of the identification"
     cure = ""
     if not network.log.findings and fitted <= USABLE_NRMSE:

@@ -70,7 +70,7 @@ CHECKS = (
         "stroke with the wrong sign",
         mirrored_stroke,
         "a release whose force was stored as its absolute value",
-        {"correlation": 0.5, "range_share": 0.2},
+        {"agreement": 0.9, "correlation": 0.5, "range_share": 0.2},
     ),
     Check(
         "moved zero",
@@ -106,7 +106,9 @@ def quality_findings(recording: Recording, attracts: bool = False) -> list[Findi
     if len(recording) < MIN_ROWS:
         return []
     checked = Checked(recording, attracts)
-    return [finding for check in CHECKS for finding in check.findings(checked, **check.thresholds)]
+    found = [finding for check in CHECKS for finding in check.findings(checked, **check.thresholds)]
+    # The cause of a result that must not be used explains the other findings.
+    return [each for each in found if each.level == "no"] or found
 
 
 def findings_of(

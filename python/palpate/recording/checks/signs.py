@@ -13,7 +13,7 @@ from ..contact import air_rows
 from ..conversion import FALLING_CORRELATION, mirror_notes
 from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S, directions_of
 from ..rows import along
-from .cells import LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
+from .cells import LEAST_COMPARED_ROWS, LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -92,28 +92,76 @@ def _lag_of(recording: Recording, gap: float) -> float:
     return gap / (2.0 * slope * speed) if slope * speed > 0.0 else np.inf
 
 
-def mirrored_stroke(checked: Checked, *, correlation: float, range_share: float) -> list[Finding]:
-    """Returns a finding if the force of the release is that of the press with the opposite sign.
+def mirrored_stroke(
+    checked: Checked, *, agreement: float, correlation: float, range_share: float
+) -> list[Finding]:
+    """Returns a finding if the force of a stroke is that of another one with the opposite sign.
+
+    Two strokes in one direction show this alone. A press and its only release can also be those of a friction
+    that grows with the position: the strokes of a second cycle would agree.
 
     Parameters
     ----------
+    agreement : float
+        Agreement of a force with the negative other one in the same direction above which they are mirrored,
+        1 for equal values [-].
     correlation : float
-        Correlation of the press and the negative release above which they are mirrored [-].
+        Agreement and correlation of a press and its negative release above which they are mirrored [-].
     range_share : float
-        Least range of each stroke as a share of that of the force [-]: a constant friction has none.
+        Least range of a press and of its release as a share of that of the force [-]: a constant friction has
+        none.
     """
-    cells = checked.cells
-    if cells is None or len(cells.press) < 4 or not _varied(checked, range_share):
+    cells, recording = checked.cells, checked.recording
+    if cells is None:
         return []
-    press, release = cells.press, cells.release
+    release = cells.cell >= cells.cells
+    edges = np.flatnonzero(np.diff(release)) + 1
+    if recording.motion.waiting is not None and len(edges) < len(release) // LEAST_STROKE_ROWS:
+        strokes = np.split(np.arange(len(release)), edges)
+    else:  # rows in another order than that of a motion
+        strokes = [np.flatnonzero(~release), np.flatnonzero(release)]
+    # The rows of each stroke are as many in a part of the travel as those of all strokes in a cell.
+    parts = max(2 * cells.cells // len(strokes), 4)
+    part, force = cells.cell % cells.cells * parts // cells.cells, recording.force[cells.row]
+    count = np.array([np.bincount(part[each], minlength=parts) for each in strokes])
+    total = np.array([np.bincount(part[each], force[each], parts) for each in strokes])
+    curves = np.where(count >= LEAST_COMPARED_ROWS, total / np.maximum(count, 1), np.nan)
+
+    def agreed(one: int, other: int) -> float:
+        shared = np.isfinite(curves[one] + curves[other])
+        first, second = curves[one, shared], -curves[other, shared]
+        power = float(first @ first + second @ second)
+        return 2.0 * float(first @ second) / power if len(first) >= 4 and power > 0.0 else 0.0
+
+    found = np.array([agreed(one, one + 2) for one in range(len(strokes) - 2)])
+    # The force of an inertia changes its sign with the speed, so that its strokes do not repeat.
+    if (found > agreement).any() and float(np.median(np.abs(found))) > agreement:
+        one = int(np.argmax(found > agreement))
+        unit, x = recording.file_unit("position"), recording.position[cells.row]
+        names = [
+            f"the {('press', 'release')[int(release[each[0]])]} from row {cells.row[each[0]]} on, "
+            f"{unit.interval(float(x[each[0]]), float(x[each[-1]]))}"
+            for each in (strokes[one], strokes[one + 2])
+        ]
+        return [
+            no(
+                f"{names[0]}, and {names[1]}, have forces with opposite signs: one of these strokes was "
+                "recorded with the wrong sign. Change the sign of its force"
+            )
+        ]
+    press, released = cells.press, cells.release
+    if len(strokes) > 3 or len(press) < 4 or not _varied(checked, range_share):
+        return []
     # A damper mirrors its force as well, but not at the turn, where it is slow.
-    turned = min(abs(each[-1]) / np.abs(each).max() for each in (press, release)) > 0.5
-    if not turned or float(np.corrcoef(press, -release)[0, 1]) <= correlation:
+    turned = min(abs(each[-1]) / np.abs(each).max() for each in (press, released)) > 0.5
+    similar = min(agreed(0, 1), float(np.corrcoef(press, -released)[0, 1]))
+    if not turned or similar <= correlation:
         return []
     return [
         no(
-            "the force of the release is that of the press with the opposite sign: one stroke was "
-            "recorded with the wrong sign. Change the sign of the force of one stroke"
+            "the force of the release is that of the press with the opposite sign: the object has only "
+            "friction, which grows with the position (record a second press and release to show this), or "
+            "one stroke was recorded with the wrong sign. Change the sign of the force of one stroke"
         )
     ]
 
