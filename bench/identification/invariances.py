@@ -3,11 +3,10 @@
 
 python bench/identification/invariances.py [NAME ...] [--draws 20] [--seed 1000] [--jobs 2] [--json FILE]
 
-The recordings are those of a tester at constant speed, one for each object of `ordinary_objects.py`. Size,
-error and slope are judged if the rows resolve them: fits that know roles and class agree on the recording and
-on its changed rows, and for a change that has another noise also on other draws of the noise. The last column
-is the share of draws in which they agree in all measures. A change of the force that a hand notices counts in
-every draw.
+The recordings are those of a tester at constant speed, one for each object of `ordinary_objects.py`. A measure
+is judged if the rows resolve it: fits that know roles and class agree in it on the recording and on its
+changed rows, and for a change that has another noise also on other draws of the noise. The last column is the
+share of draws in which they agree in all measures.
 """
 
 from __future__ import annotations
@@ -45,9 +44,6 @@ MEASURES = ("size", "error", "slope", "force", "class", "verdict")
 
 NOISES = 2
 """Number of further draws of the noise"""
-
-RESOLVED = ("size", "error", "slope")
-"""Measures that noise changes: they are judged only if the fits that know roles and class agree in them"""
 
 
 @dataclass(frozen=True)
@@ -313,7 +309,7 @@ def measure(draw: int, names: Sequence[str]) -> dict[str, dict[str, bool]]:
             agreed = dict.fromkeys(MEASURES, False)
         judged = ("class", "verdict") if change in COARSER else MEASURES
         found[change.__name__] = {
-            **{name: agreed[name] for name in judged if name not in RESOLVED or limit[name]},
+            **{name: agreed[name] for name in judged if limit[name]},
             "resolved": all(limit[name] for name in judged),
         }
     return found

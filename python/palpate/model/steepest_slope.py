@@ -84,9 +84,10 @@ class SteepestSlope:
         return f"{at} of the {self.stroke}" if self.stroke else at
 
     def text(self, model: Model) -> str:
-        """Returns the slope, its place and, as far as the model file has it, the number of rows there."""
+        """Returns the slope, its place and, if it rises and the model file has it, the number of rows
+        there."""
         position, force = model.units["position"], model.units["force"]
         unit = f" {force}/{position}" if position and force else ""
-        rows = model.notes.get(ROWS_KEY)
+        rows = model.notes.get(ROWS_KEY) if self.slope > 0.0 else None
         counted = f", known from {rows} row{'' if rows == 1 else 's'}" if isinstance(rows, int) else ""
         return f"{float(f'{self.slope:.3g}'):g}{unit} at {self.place(position)}{counted}"

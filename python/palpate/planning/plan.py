@@ -324,8 +324,9 @@ class Plan:
         if slope < steepest:
             stiffness = self._units()["stiffness"]
             rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}{stiffness}"
-        if (place := SteepestSlope.of(self.model)) is not None:
-            rows["steepest slope"] = place.text(self.model)
+        for name, falling in (("steepest slope", False), ("steepest fall", True)):
+            if (place := SteepestSlope.of(self.model, falling=falling)) is not None:
+                rows[name] = place.text(self.model)
         rows["force error"] = self.force_error_text
         if self.model.period is None and self.model.dimension == 1:
             rows["below contact"] = f"the force {CONTINUATIONS[self.model.below]}"

@@ -98,8 +98,10 @@ def role_counts(role: Int8Vector) -> dict[str, int]:
 
 
 def counts_text(counts: Mapping[str, int]) -> str:
-    """Returns numbers of rows as text: "2186 move, 155 wait in contact"."""
-    return ", ".join(f"{count} {name}" for name, count in counts.items())
+    """Returns numbers of rows as text: "2186 move, 1 waits in contact"."""
+    return ", ".join(
+        f"{count} {name.replace('wait ', 'waits ') if count == 1 else name}" for name, count in counts.items()
+    )
 
 
 class Informative:

@@ -481,6 +481,11 @@ def test_a_plan_names_the_steepest_slope_with_the_rows_on_it() -> None:
     assert int(found[3]) == pytest.approx(np.count_nonzero(slope > 0.5 * slope.max()), abs=5)
 
 
+def test_a_plan_names_the_steepest_fall() -> None:
+    falls = plan(keyswitch_by_hand(play_radius=1e-5), find_profile("voice-coil")).summary()["steepest fall"]
+    assert re.fullmatch(r"-\S+ N/m at \S+ m of the (press|release)", falls)
+
+
 def test_the_least_play_radius_is_advised_and_sufficient() -> None:
     model = keyswitch_by_hand(play_radius=1e-5)
     coil = find_profile("voice-coil")

@@ -405,6 +405,14 @@ def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
     assert zero_sentences(x, f) == []
 
 
+def test_few_rows_of_an_approach_through_air_are_no_gap() -> None:
+    press = np.r_[-1.2e-3, -0.8e-3, -0.3e-3, np.linspace(0.0, 4e-3, 400)]
+    x = np.r_[press, press[::-1]]
+    f = 500.0 * np.maximum(x, 0.0) + np.random.default_rng(0).normal(0.0, 2e-3, len(x))
+    found = sentences(Rows(x, f, None, None, {"position": "m", "force": "N"}))
+    assert not [each for each in found if "no rows" in each]
+
+
 def cycles_with_signs(*signs: float, friction: float = 0.1) -> list[str]:
     """Returns the sentences on strokes of a spring with friction, each stored with one of the signs."""
     press = np.linspace(0.0, 4e-3, 300)

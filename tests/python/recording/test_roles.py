@@ -11,7 +11,7 @@ import palpate
 from conftest import sampled
 from imperfect import Array, knob, loop, press_and_release, recorded
 from palpate.recording.contact import contact_at
-from palpate.recording.roles import Informative, Role, roles_of
+from palpate.recording.roles import Informative, Role, counts_text, roles_of
 
 MOTION = press_and_release()
 
@@ -211,3 +211,9 @@ def test_a_pause_of_a_knob_leaves_no_spike() -> None:
     for direction in (1.0, -1.0):
         error = model.force(at, direction=np.full(len(at), direction)) - (knob(at) + 2.5 * direction)
         assert np.abs(error).max() < 0.3
+
+
+def test_one_row_waits_and_two_rows_wait() -> None:
+    assert counts_text({"move": 3, "wait in air": 1, "wait in contact": 2}) == (
+        "3 move, 1 waits in air, 2 wait in contact"
+    )

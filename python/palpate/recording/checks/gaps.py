@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...verdict import Finding, usable
+from ...verdict import FORCE_FLOOR, Finding, usable
 from .cells import Checked
 
 
@@ -28,6 +28,9 @@ def position_gaps(
     if not travel > 0.0 or recording.input_names:
         return []
     way, unit = recording.direction, recording.file_unit("position")
+    force = np.abs(recording.force)
+    # Between rows before the first noticeable force the tool is in air: there the force is known.
+    contact = recording.position[force >= FORCE_FLOOR * force.max()].min()
     strokes = {"recording": recording.position}
     if way is not None:
         strokes |= {
@@ -43,6 +46,7 @@ def position_gaps(
         distances = np.diff(at)
         bound = max(gap_share * travel, gap_ratio * float(np.percentile(distances, 90.0)))
         gaps = [(float(at[k]), float(at[k + 1])) for k in np.flatnonzero(distances > bound)]
+        gaps = [gap for gap in gaps if gap[1] >= contact]
         gaps = [gap for gap in gaps if gap not in reported]
         reported.update(gaps)
         ends = ((checked.lower, float(at[0])), (float(at[-1]), checked.upper))
