@@ -3,10 +3,10 @@
 
 python bench/identification/invariances.py [NAME ...] [--draws 20] [--seed 1000] [--jobs 2] [--json FILE]
 
-The recordings are those of a tester at constant speed, one for each object of `ordinary_objects.py`. A measure
-is judged if the rows resolve it: fits that know roles and class agree in it on the recording and on its
-changed rows, and for a change that has another noise also on other draws of the noise. The last column is the
-share of draws in which they agree in all measures.
+The recordings are those of a tester at constant speed, one for each object of `ordinary_objects.py`. A
+measure is judged if the rows resolve it: fits that know roles and class agree in it on the recording and on
+its changed rows. If a change has another noise, they must agree on other draws of the noise too. The last
+column is the share of draws in which they agree in all measures.
 """
 
 from __future__ import annotations
@@ -56,6 +56,10 @@ class Changed:
     """The recordings, if not those of the rows"""
     zero: float = 0.0
     """Position at which the other recording has 0 [m or rad]"""
+
+    @property
+    def recordings(self) -> Recording | list[Recording]:
+        return self.rows.recording() if self.stored is None else self.stored
 
 
 def drawn(draw: int) -> tuple[Rows, Generator]:
@@ -302,9 +306,8 @@ def measure(draw: int, names: Sequence[str]) -> dict[str, dict[str, bool]]:
         limit = compared(known, truth, reference(changed.rows), truth)
         if change in OTHER_NOISE:
             limit = {name: limit[name] and noise[name] for name in MEASURES}
-        stored = changed.rows.recording() if changed.stored is None else changed.stored
         try:
-            agreed = compared(model, truth, palpate.identify(stored), moved)
+            agreed = compared(model, truth, palpate.identify(changed.recordings), moved)
         except InputError:
             agreed = dict.fromkeys(MEASURES, False)
         judged = ("class", "verdict") if change in COARSER else MEASURES

@@ -595,7 +595,7 @@ def _derivatives(
         raise InputError(
             f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from "
             f"{sum(map(len, recordings))} rows: the pieces between gaps in time are too short, or the noise "
-            "of the position is too large. Record whole strokes without gaps in time, with more rows per stroke"
+            "of the position is too large. Record whole strokes without gaps in time, with more rows in each"
         )
     return [
         at_rows(each, low_pass, order, len(recording))

@@ -405,7 +405,7 @@ def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
     assert zero_sentences(x, f) == []
 
 
-def test_few_rows_of_an_approach_through_air_are_no_gap() -> None:
+def test_few_rows_of_an_approach_through_air_are_not_a_gap() -> None:
     press = np.r_[-1.2e-3, -0.8e-3, -0.3e-3, np.linspace(0.0, 4e-3, 400)]
     x = np.r_[press, press[::-1]]
     f = 500.0 * np.maximum(x, 0.0) + np.random.default_rng(0).normal(0.0, 2e-3, len(x))

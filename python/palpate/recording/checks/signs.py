@@ -159,9 +159,9 @@ def mirrored_stroke(
         return []
     return [
         no(
-            "the force of the release is that of the press with the opposite sign: the object has only "
-            "friction, which grows with the position (record a second press and release to show this), or "
-            "one stroke was recorded with the wrong sign. Change the sign of the force of one stroke"
+            "the force of the release is that of the press with the opposite sign. Either the object has "
+            "only friction, which grows with the position: record a second press and release to show this. "
+            "Or one stroke has the wrong sign. Change the sign of the force of one stroke"
         )
     ]
 
