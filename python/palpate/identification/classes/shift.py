@@ -19,6 +19,7 @@ from ..network.constraints import impose
 from ..network.separable import SeparableProblem, Solution
 from ..search.evidence import Candidate, Samples, criterion_of
 from .class_selection import ClassSelection
+from .repeatability import left_out_residual
 
 DISTANCES = 2.0 ** np.arange(-10.0, -4.0, 0.5)
 """Distances between press and release that are tried [travel]: from those of measured domes to one beyond
@@ -53,8 +54,9 @@ def shift_of(selection: ClassSelection) -> Shift | None:
     Backlash of a distance d between the position sensor and the object shows the force of the object at
     x - s d/2, with the direction s; a force that is late by t shows that at x(time - t). Where the force
     rises, the press is then below the release, which a passive object excludes. If a hysteresis of any sign
-    lowers BIC as much as a model class must, the wavelets of the model are refined on moved rows. The shift
-    must explain a quarter of the squared error that is not noise, as velocity must.
+    lowers BIC as much as a model class must, and the squared error by more than the force between rows adds
+    to it, the wavelets of the model are refined on moved rows. The shift must explain a quarter of the
+    squared error that is not noise, as velocity must.
     """
     best, options = selection.best, selection.options
     data = best.data
@@ -95,6 +97,9 @@ def shift_of(selection: ClassSelection) -> Shift | None:
     if criterion_of(problem, free, "bic") > allowed:
         return None
     explained = unmoved.rmse**2 - problem.rmse(free) ** 2
+    between = replace(best.error, residual=selection.once(left_out_residual))
+    if explained < between.rmse**2 - best.error.rmse**2:
+        return None  # rows that are far apart explain as much
     amounts = [*product(DISTANCES.tolist(), [False]), *product(LAGS_S.tolist() if data.parts else [], [True])]
     near, late = min(amounts, key=lambda each: at(*each).rmse)
     amount = 2.0 ** float(
