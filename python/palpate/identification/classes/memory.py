@@ -302,7 +302,7 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
     in_order = all(part.time is not None or _in_order(part) for part in recordings)
     if not (automatic and in_order) or found.inputs not in (("position",), VELOCITY_INPUTS):
         return ""
-    if any(len(part.input_names) for part in recordings):
+    if any(len(part.input_names) for part in recordings) or not np.ptp(found.rows.force):
         return ""
     if found.inputs != VELOCITY_INPUTS:
         errors = found.errors
