@@ -121,11 +121,12 @@ class ClassSelection:
         start: Basis,
         model_class: str,
         *,
+        most: int | None = None,
         strokes: HysteresisInput | None = None,
     ) -> Candidate:
         """Returns the candidate of a network that grows from the wavelets of `start`, and reports the tested
         networks."""
-        grown = self.growth.grow(problem, start, model_class)
+        grown = self.growth.grow(problem, start, model_class, most=most)
         self.log.path.extend(grown.path)
         return self.candidate(model_class, grown.problem, grown.solution, grown.stop_reason, strokes=strokes)
 

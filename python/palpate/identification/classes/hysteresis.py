@@ -32,12 +32,23 @@ REPORTED_ERROR_RATIO = 2.0
 """Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
 above which a finding names a cure [-]."""
 
+FIRST_MAX_WAVELETS = 4
+"""Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
+second time."""
+
 MOST_RADIUS_SEARCHES = 6
 """Largest number of searches of the play radius."""
+
+RADIUS_TOLERANCE = 1e-3
+"""Relative error of the play radius at which the search of the play radius ends [-]."""
 
 RADIUS_SEARCH_RATIO = 2.0
 """A search tries play radii between the best radius so far divided by this ratio and that radius times this
 ratio [-]."""
+
+REVERSAL = 0.12
+"""Distance from a turn up to which no row is fitted by the wavelets that show the play radius [travel]: the
+friction of the largest radius reverses in it. With twice this distance, few rows are left."""
 
 REWEIGHTINGS = 5
 """Number of fits of given wavelets, each with the weights that follow from the fit before."""
@@ -154,20 +165,26 @@ class Hysteresis:
         """Returns a network with hysteresis; its play radius is searched if hysteresis is accepted or the
         options name it.
 
-        Wavelets grown at a wrong play radius, or without hysteresis, model the error of the radius. So growth
-        starts without wavelets, and again at each better radius that its wavelets show.
+        Wavelets grown at a wrong play radius, or without hysteresis, model the error of the radius. A radius
+        found with too few wavelets compensates for the missing wavelets. So growth starts again without
+        wavelets, and the radius is searched again each time the allowed number of wavelets doubles.
         """
         assert found.strokes is not None
-        selection, strokes = self._selection, found.strokes
-        before: HysteresisInput | None = None
+        selection, samples = self._selection, self._selection.samples
+        strokes, most = found.strokes, selection.options.max_wavelets
+        basis, searched, complete = found.solution.basis, False, False
         for _ in range(MOST_RADIUS_SEARCHES):
-            start = found.solution.basis
+            before = strokes
             if play and (self._named or selection.judge.accepts(below, found)):
-                strokes, start = self._weighted(play.with_best_radius(strokes, start), start), Basis.empty(1)
-            if strokes is before:
+                strokes = self._weighted(play.with_best_radius(strokes, basis), basis)
+                basis, searched = (basis if searched else Basis.empty(1)), True
+            if complete and strokes is before:
                 break
-            before, problem = strokes, selection.samples.problem(strokes)
-            found = selection.grown(problem, start, self.name, strokes=strokes)
+            limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
+            problem, passed = samples.problem(strokes), len(selection.log.path)
+            found = selection.grown(problem, basis, self.name, most=limit, strokes=strokes)
+            basis, path = found.solution.basis, selection.log.path[passed:]
+            complete = limit == most or max(point.n_wavelets for point in path) < limit
         return found
 
     def _weighted(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
@@ -229,14 +246,12 @@ class PlaySearch:
         # A tool that waits does not move the play: noise of its position would.
         self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
-        self._reversal = 2.0 * self._radii[-1]
-        """Distance in which the friction of the largest radius reverses behind a turn [travel]"""
 
     def settled(self, order: HysteresisInput) -> HysteresisInput:
         """Returns the directions of the rows behind reversals."""
         moving, stroke, turns = turns_before(order.side * self._samples.data.fitted)
         settled = np.zeros(len(self._path), dtype=bool)
-        settled[moving] = np.abs(self._path[moving] - self._path[turns][stroke]) > self._reversal
+        settled[moving] = np.abs(self._path[moving] - self._path[turns][stroke]) > REVERSAL
         return replace(order, known=settled)
 
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
@@ -283,6 +298,7 @@ class PlaySearch:
             lambda log_radius: self._residual_squares(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
             method="bounded",
+            options={"xatol": RADIUS_TOLERANCE},
         )
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
@@ -291,7 +307,7 @@ class PlaySearch:
         """True if the tool, whose rows have the directions `order` (n,), turns at places that are further
         apart than the way in which friction reverses."""
         at = self._path[turns_before(order)[2][1:]]
-        return any(np.ptp(ends) > self._reversal for ends in (at[::2], at[1::2]) if len(ends))
+        return any(np.ptp(ends) > REVERSAL for ends in (at[::2], at[1::2]) if len(ends))
 
     def _of(self, radius: float) -> HysteresisInput:
         return HysteresisInput.of_play(np.split(self._path, self._starts[1:]), radius)

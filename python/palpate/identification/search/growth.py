@@ -121,13 +121,15 @@ class Growth:
         self._search, self._criterion, self._most = options.search, options.criterion, options.max_wavelets
         self._single, self._periodic = single, options.period is not None
 
-    def grow(self, problem: SeparableProblem, start: Basis, model_class: str) -> Grown:
-        """Grows from the wavelets of start; an order of harmonics counts as one wavelet.
+    def grow(
+        self, problem: SeparableProblem, start: Basis, model_class: str, *, most: int | None = None
+    ) -> Grown:
+        """Grows from the wavelets of start to `most` wavelets at most; an order of harmonics counts as one.
 
         A periodic force grows twice: from harmonics, to which wavelets are added, and from wavelets alone, as
         long as these have fewer parameters. The criterion decides.
         """
-        most, criterion = self._most, self._criterion
+        most, criterion = self._most if most is None else most, self._criterion
         if not self._periodic:
             return self._grown_finer(problem, start, model_class, most)
         problem = problem.with_prior(problem.solve(start).rss)
