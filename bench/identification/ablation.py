@@ -284,6 +284,7 @@ RULES = (
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
     Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
     Rule("terms explain more than an object that changes", f"{CLASSES}.causes", "Judged.changed", 0.0),
+    Rule("memory explains more than later strokes alone", f"{CLASSES}.memory", "first_strokes", _nothing),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_residual", lambda of: of.best.residual),
     *map(without_check, checks.CHECKS),

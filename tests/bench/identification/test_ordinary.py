@@ -32,6 +32,7 @@ from bench.identification.ordinary_recordings import (
     two_speeds,
 )
 
+import palpate
 from palpate import Model
 
 ALL_PAIRS = len(OBJECTS) * len(OPERATORS)
@@ -291,6 +292,14 @@ def test_a_refused_recording_is_counted_and_not_judged(capsys: pytest.CaptureFix
     assert "no reference: 1 of 3 recordings" in capsys.readouterr().out
     found = report_of("object", rows)
     assert (found[0]["draws"], found[0]["refused"], found[0]["silent"]) == (3, 1, 1)
+
+
+def test_a_tissue_keeps_its_memory_although_its_first_press_from_rest_differs() -> None:
+    """In contact the branches explain the rows better than a model of the later presses."""
+    rows = drawn(14725)[1]
+    model = palpate.identify(rows.take(np.arange(0, len(rows.force), 5)).recording())
+    assert model.memory is not None
+    assert Truth.of(rows).error(model) < 0.03
 
 
 def test_the_bench_judges_a_draw_and_writes_its_results(

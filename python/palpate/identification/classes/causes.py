@@ -161,7 +161,7 @@ class _Strokes:
     """Rows of strokes, to compare those in the same direction over the same place.
 
     The mean of the rows of a stroke at a place counts once: the rows of a slow stroke are not independent.
-    A stroke has a row in each place on average: two strokes have no narrower places in common.
+    A stroke has a row in each place on average: two strokes have few narrower places in common.
     """
 
     best: Judged
@@ -281,8 +281,12 @@ def first_strokes(best: Judged) -> NDArray[np.bool_] | None:
     # A stroke mostly over new places is a first one also at those that it has in part in common.
     new = np.bincount(strokes.number, ~again) > 0.5 * np.bincount(strokes.number)
     alone = ~again | (new[strokes.number] & ~strokes.again(wholly=True))
-    first[strokes.rows[alone & np.isin(strokes.group, strokes.group[again])]] = True
-    return first
+    for way in (strokes.group < strokes.places, strokes.group >= strokes.places):
+        later = strokes.group[way & again]
+        within = (later.min(initial=2 * PLACES) <= strokes.group) & (strokes.group <= later.max(initial=0))
+        first[strokes.rows[way & alone & within]] = True
+    # A wait belongs to the stroke before it.
+    return np.asarray(first[np.maximum.accumulate(np.where(best.weight > 0.0, np.arange(len(first)), 0))])
 
 
 def _cause_of(best: Judged) -> Cause | None:

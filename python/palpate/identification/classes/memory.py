@@ -31,6 +31,7 @@ from ..network.fitted import Errors, FittedNetwork
 from ..network.separable import TINY
 from ..options import IdentifyOptions
 from ..search.evidence import deviance, on_fitted_rows
+from .causes import first_strokes
 from .class_selection import VELOCITY_INPUTS
 from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
 from .memory_fit import CURVE_POINTS, MemoryFit, Motion, Ranges, Resting, Shape
@@ -349,7 +350,9 @@ def _with_memory(
     if choice.shape is None:
         return "no branch lowers the criterion"
     compared = _Compared.of(found, recorded)
-    moved = judged_network(found, found.rows).changed if found.shows_all(recordings) else 0.0
+    judged = judged_network(found, found.rows) if found.shows_all(recordings) else None
+    first = first_strokes(judged) if judged else None
+    moved = judged.changed if judged and first is None else 0.0
     before = max(compared.rmse**2 - moved, TINY) / recorded.spread**2
     in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
@@ -405,6 +408,19 @@ def _with_memory(
         accepted = falls >= options.search.evidence
     if not accepted:
         return text
+    if first is not None:
+        ends = np.cumsum([len(part) for part in recordings])[:-1]
+        parts = zip(recordings, np.split(first, ends), strict=True)
+        others = [part.without(rows) for part, rows in parts]
+        later = fit_rows(rows_of(others, options), options)
+        alone = _Compared.of(later, Recorded.of(others, later, options))
+        of_later = alone.rmse_where_sure if len(refined.log_yield) else alone.rmse
+        # The first strokes would need as many numbers again.
+        n = min(later.independent_rows, fit.n_rows)
+        falls = deviance("bic", n * error**2, n, n_parameters)
+        falls -= deviance("bic", n * of_later**2, n, 2 * later.n_parameters)
+        if falls >= options.search.evidence:
+            return f"without the first strokes over their places, which differ, {lowered('BIC', -falls)}"
     nrmse = of_all / recorded.judged_spread
     left_out_nrmse *= recorded.spread / recorded.judged_spread
     network = replace(
@@ -429,8 +445,8 @@ def _with_memory(
             list(_undetermined(found, recordings)),
         ),
     )
-    judged = judged_network(network, rows_of(recordings, options))
-    findings = drift_findings(judged) or place_findings(judged)
+    relaxing = judged_network(network, rows_of(recordings, options))
+    findings = drift_findings(relaxing) or place_findings(relaxing)
     if recorded.left and 2.0 * error**2 <= of_all**2 and (findings or nrmse > USABLE_NRMSE):
         findings = [_forgotten(recorded, of_all, error)]
     network.log.findings.extend(findings)

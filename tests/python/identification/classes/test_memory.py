@@ -454,6 +454,27 @@ def test_a_zero_that_drifts_is_not_a_branch_that_slips() -> None:
     assert "compared with a zero or an object that changes" in str(model.notes["model_selection"])
 
 
+def test_an_object_that_softens_has_no_branches_that_slip() -> None:
+    """Without the first press the force is a loop of friction, with a smaller error than that of branches."""
+    random = np.random.default_rng(1)
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 14), np.linspace(1.0, 0.0, 14)[1:-1]], 2)
+    x += random.uniform(-0.02, 0.02, len(x))
+    side = np.clip((x - play(x, 0.02, start=x[0])) / 0.02, -1.0, 1.0)
+    soft = 1.0 - 0.2 * -np.expm1(-(np.maximum.accumulate(x) - x) / 0.1)
+    force = (x + 0.9 * x**2) * (1.0 + 0.08 * side) * soft
+    model = palpate.identify(x, force + random.normal(0.0, 0.003, len(x)))
+    assert model.memory is None
+    assert model.verdict.reasons[0].startswith("behind the first stroke over a position")
+
+
+@pytest.mark.full
+def test_branches_that_slip_explain_a_first_press_from_rest() -> None:
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 40), np.linspace(1.0, 0.0, 40)[1:-1]], 3)
+    force = x + sum(k * (x - play(x, r, start=x[0])) for k, r in ((0.6, 0.1), (0.5, 0.3), (0.4, 0.8)))
+    model = palpate.identify(x, force + np.random.default_rng(0).normal(0.0, 0.004, len(x)))
+    assert model.memory is not None
+
+
 def test_a_large_rise_of_the_error_is_stated_as_a_multiple() -> None:
     text = squared_error_change(-569.79, 0.0)
     assert text == "raises the squared error on held-out sections to 571 times"
