@@ -240,6 +240,34 @@ def effect_of_shift(selection: ClassSelection) -> tuple[float, list[Finding], li
     return rms / spread, [], [f"P{sentence[1:]}."]
 
 
+def energy_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding if a force of position and velocity gains energy: on average over a place, the force
+    of a press is below that of a release at the same speed, and a hand feels the difference."""
+    data, rows = best.data, np.flatnonzero(best.error.weight > 0.0)
+    if data.names != VELOCITY_INPUTS or not len(rows):
+        return []
+    there, back = data.positions[rows], data.positions[rows] * (1.0, -1.0)
+    known = np.abs(there[:, 1]) <= min(data.positions[rows, 1].max(), -data.positions[rows, 1].min())
+    there, back = there[known], back[known]
+    loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
+    place = places_of(data.box[rows][known], None)
+    mean, force = means_at(place, np.ones(len(place)), loop, data.force[rows][known])
+    gained = -mean / force_jnd(force, judged_candidate(best).floor or 1.0)
+    worst = int(np.argmax(gained))
+    if gained[worst] <= MOST_JND:
+        return []
+    position = data.position_unit.text(
+        float(data.lower[0] + data.reach[0] * (worst + 0.5) / (len(mean) // 2))
+    )
+    return [
+        usable(
+            f"at {position} the force of a release is {data.force_unit.text(-float(mean[worst]))} above that "
+            "of a press at the same speed; a passive object cannot do that. A stroke has another zero or the "
+            f"wrong sign, or {shifted_strokes(True)}"
+        )
+    ]
+
+
 def drift_findings(best: Judged) -> list[Finding]:
     """Returns a finding if strokes in the same direction over the same place differ by more than a just
     noticeable difference. One press and release cannot show this."""
@@ -369,6 +397,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings += (
         of_shift
         or log.findings
+        or energy_findings(best)
         or limit_findings(best, judged, options.max_wavelets)
         or drift_findings(judged)
         or place_findings(judged)

@@ -420,3 +420,12 @@ def test_the_error_on_left_out_rows_is_not_below_that_between_few_rows(rows: int
         ratios.append(true / model.notes["left_out_nrmse"])
     assert max(ratios) < 1.3
     assert np.median(ratios) > 0.2
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_force_of_velocity_that_gains_energy_is_named(sign: float) -> None:
+    time = 1e-3 * np.arange(N)
+    speed = np.gradient(X, time)
+    force = Y + sign * 0.2 * np.ptp(Y) * speed / np.abs(speed).max()
+    model = palpate.identify(recorded(X, force, time), inputs="position,velocity")
+    assert ("a press at the same speed" in str(model.verdict)) == (sign < 0.0)
