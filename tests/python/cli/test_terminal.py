@@ -164,20 +164,19 @@ def _processor_time_s(pid: int) -> float:
 
 
 def test_ctrl_c_ends_a_library_computation_before_it_is_complete() -> None:
-    code = (
-        "import time, click, numpy as np\n"
-        "from palpate.cli.exit_status import interrupted_at_once\n"
-        "with interrupted_at_once():\n"
-        "    matrix = np.random.default_rng(0).normal(size=(3000, 3000))\n"
-        "    print(time.process_time(), flush=True)\n"
-        "    try:\n"
-        "        np.linalg.svd(matrix)\n"  # takes many seconds
-        "    finally:\n"
-        "        print('complete', flush=True)\n"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    lines = [
+        "import time, click, numpy as np",
+        "from palpate.cli.exit_status import interrupted_at_once",
+        "with interrupted_at_once():",
+        "    matrix = np.random.default_rng(0).normal(size=(3000, 3000))",
+        "    print(time.process_time(), flush=True)",
+        "    try:",
+        "        np.linalg.svd(matrix)",  # takes many seconds
+        "    finally:",
+        "        print('complete', flush=True)",
+    ]
+    program = [sys.executable, "-c", "\n".join(lines)]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         begun_s = float(process.stdout.readline())
         while _processor_time_s(process.pid) < begun_s + 0.2:
