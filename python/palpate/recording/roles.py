@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from .._typing import Float1D, Int8Vector
 from ..verdict import FORCE_FLOOR
 from .checks.wrong_readings import repeated_rows, wrong_readings
 from .contact import contact_at
+from .rows import of_each
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -166,9 +167,9 @@ class Informative:
     def drop_wrong_readings(self, residuals: Float1D | None = None) -> bool:
         """Drops rows with a wrong reading, and returns True if there are any. With the residuals (n,) of a
         model at all rows, these are compared in place of the forces."""
-        before, parts = self.dropped.get(WRONG_READING, 0), self._of_recordings(residuals)
-        for number, recording in enumerate(self.recordings):
-            residual = None if residuals is None else parts[number]
+        before, count = self.dropped.get(WRONG_READING, 0), len(self.recordings)
+        parts = [None] * count if residuals is None else of_each(self.recordings, residuals)
+        for number, (recording, residual) in enumerate(zip(self.recordings, parts, strict=True)):
             path, position, force = recording.motion.position, recording.position, recording.force
             wrong = wrong_readings(path, position, force, recording.inputs.T, residual)
             self._drop(number, wrong, WRONG_READING)
@@ -176,13 +177,8 @@ class Informative:
 
     def drop_first_strokes(self, first: NDArray[np.bool_]) -> None:
         """Drops rows (n,) of all recordings at which a stroke passes a place for the first time."""
-        for number, rows in enumerate(self._of_recordings(first)):
+        for number, rows in enumerate(of_each(self.recordings, first)):
             self._drop(number, rows, "first stroke")
-
-    def _of_recordings(self, values: NDArray[Any] | None) -> list[NDArray[Any]]:
-        """Returns the values at the rows of each recording, from those at all rows (n,)."""
-        ends = np.cumsum([len(each) for each in self.recordings])[:-1]
-        return [] if values is None else np.split(values, ends)
 
     def _drop(self, number: int, rows: NDArray[np.bool_], reason: str) -> None:
         """Drops rows (n,) of one recording."""

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,6 +178,11 @@ class RowCheck:
 
 def _rows(count: int) -> str:
     return f"{count} row{'s' * (count > 1)}"
+
+
+def of_each(parts: Iterable[Sized], values: NDArray[Any]) -> list[NDArray[Any]]:
+    """Returns the values of each recording, from those at the rows (n,) of all."""
+    return np.split(values, np.cumsum([len(part) for part in parts])[:-1])
 
 
 def along(position: Float1D, direction: Int8Vector) -> Float1D:

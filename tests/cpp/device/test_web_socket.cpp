@@ -290,6 +290,14 @@ TEST(WebSocket, TheRequestIsThatOfTheStandard) {
     }
 }
 
+void expect_first_message(const Server& server) {
+    WebSocket socket;
+    ASSERT_EQ(socket.open("127.0.0.1", server.port, late()), "");
+    std::string message;
+    EXPECT_TRUE(socket.receive(message, late()));
+    EXPECT_EQ(message, "first");
+}
+
 TEST(WebSocket, AnAnswerThatAcceptsInOtherWordsAndInPiecesIsAccepted) {
     const std::string answer =
         "HTTP/1.1 101 \r\nX: y\r\nSEC-WEBSOCKET-ACCEPT:\t s3pPLMBiTxaQ9kYGzzhZRbK+xOo= \r\n\r\n";
@@ -302,11 +310,7 @@ TEST(WebSocket, AnAnswerThatAcceptsInOtherWordsAndInPiecesIsAccepted) {
         client.send(frame(text, "first"));
         (void)client.received_frame();
     }};
-    WebSocket socket;
-    ASSERT_EQ(socket.open("127.0.0.1", server.port, late()), "");
-    std::string message;
-    EXPECT_TRUE(socket.receive(message, late()));
-    EXPECT_EQ(message, "first");
+    expect_first_message(server);
 }
 
 TEST(WebSocket, AMessageBehindTheHandshakeInTheSamePacketIsReceived) {
@@ -315,11 +319,7 @@ TEST(WebSocket, AMessageBehindTheHandshakeInTheSamePacketIsReceived) {
         client.send(std::string{accepting} + frame(text, "first"));
         (void)client.received_frame();
     }};
-    WebSocket socket;
-    ASSERT_EQ(socket.open("127.0.0.1", server.port, late()), "");
-    std::string message;
-    EXPECT_TRUE(socket.receive(message, late()));
-    EXPECT_EQ(message, "first");
+    expect_first_message(server);
 }
 
 TEST(WebSocket, AServerThatDoesNotAcceptTheHandshakeIsRefused) {

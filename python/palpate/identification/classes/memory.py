@@ -22,6 +22,7 @@ from ...recording import Recording
 from ...recording.contact import contact_at
 from ...recording.motion import FORCE_RESOLUTION, noise_band, ordered_strokes, states_its_order, velocities
 from ...recording.roles import Role, roles_of
+from ...recording.rows import of_each
 from ...verdict import Finding, usable
 from ..data.limits import LEAST_GAIN
 from ..data.rows import Rows, rows_of
@@ -409,8 +410,7 @@ def _with_memory(
     if not accepted:
         return text
     if first is not None:
-        ends = np.cumsum([len(part) for part in recordings])[:-1]
-        parts = zip(recordings, np.split(first, ends), strict=True)
+        parts = zip(recordings, of_each(recordings, first), strict=True)
         others = [part.without(rows) for part, rows in parts]
         later = fit_rows(rows_of(others, options), options)
         alone = _Compared.of(later, Recorded.of(others, later, options))
@@ -517,7 +517,6 @@ class _Compared:
     @classmethod
     def of(cls, found: FittedNetwork, recorded: Recorded) -> _Compared:
         parts, errors = recorded.recordings, found.errors
-        ends = np.cumsum([len(part) for part in parts])
         force, position = (
             recorded.fitted([getattr(part, name) for part in parts]) for name in ("force", "position")
         )
@@ -532,7 +531,7 @@ class _Compared:
             return cls(balance, whole, whole, rmse, rmse)
         else:
             residual, share = (
-                recorded.fitted(np.split(each, ends[:-1])) for each in (errors.residual, errors.share)
+                recorded.fitted(of_each(parts, each)) for each in (errors.residual, errors.share)
             )
             strokes = [found.force(position[:, None], np.full(len(force), side)) for side in (1.0, -1.0)]
             outside = force - np.clip(force, np.minimum(*strokes), np.maximum(*strokes))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...recording import Recording
 from ...recording.conversion import Motion
+from ...recording.rows import of_each
 from .compression import SECTIONS
 
 MOST_ROWS = 500_000
@@ -84,7 +85,7 @@ def _add_missing_values(
             if not found[key[row]]:
                 chosen[block[row]] = True
                 found[key[block == block[row]]] = True
-    for mine, part in zip(blocks, np.split(chosen, ends[:-1]), strict=True):
+    for mine, part in zip(blocks, of_each(blocks, chosen), strict=True):
         mine[:] = part
 
 

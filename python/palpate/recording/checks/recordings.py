@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...verdict import Finding, no, usable
+from ..rows import of_each
 from ..units import GRAVITY
 from .cells import MOST_CELLS, sides
 
@@ -104,8 +105,7 @@ def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None)
     """
     if len(recordings) < 2 or any(recording.input_names for recording in recordings):
         return []
-    ends = np.cumsum([len(recording) for recording in recordings])[:-1]
-    directions = [None] * len(recordings) if side is None else np.split(side, ends)
+    directions = [None] * len(recordings) if side is None else of_each(recordings, side)
     strokes = [_Strokes.of(*each) for each in zip(recordings, directions, strict=True)]
     differences = [
         [min(_difference(one, other), 1.0) for other in strokes[:MOST_COMPARED_RECORDINGS]]

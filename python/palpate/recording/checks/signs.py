@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._typing import Float1D, Float2D
 from ...verdict import FORCE_FLOOR, Finding, force_jnd, no, usable
 from ..contact import air_rows
 from ..conversion import FALLING_CORRELATION, mirror_notes
 from ..motion import LEAST_STROKE_ROWS, LONGEST_LAG_S, directions_of
 from ..rows import along
-from .cells import LEAST_COMPARED_ROWS, LEAST_ROWS_PER_CELL, MOST_CELLS, Checked, inner_range
+from .cells import LEAST_COMPARED_ROWS, LEAST_ROWS_PER_CELL, MOST_CELLS, CellRows, Checked, inner_range
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -92,6 +93,33 @@ def _lag_of(recording: Recording, gap: float) -> float:
     return gap / (2.0 * slope * speed) if slope * speed > 0.0 else np.inf
 
 
+def _strokes_of(checked: Checked, cells: CellRows) -> tuple[list[NDArray[np.intp]], Float2D]:
+    """Returns the compared rows of each stroke, and the mean force of each stroke at the parts of the travel
+    (strokes, parts); NaN at a part with few rows. Without the order of a motion, all presses and all releases
+    are one stroke each."""
+    recording, release = checked.recording, cells.cell >= cells.cells
+    edges = np.flatnonzero(np.diff(release)) + 1
+    if recording.motion.waiting is not None and len(edges) < len(release) // LEAST_STROKE_ROWS:
+        strokes = np.split(np.arange(len(release)), edges)
+    else:
+        strokes = [np.flatnonzero(~release), np.flatnonzero(release)]
+    # The rows of each stroke are as many in a part of the travel as those of all strokes in a cell.
+    parts = max(2 * cells.cells // len(strokes), 4)
+    part, force = cells.cell % cells.cells * parts // cells.cells, recording.force[cells.row]
+    count = np.array([np.bincount(part[each], minlength=parts) for each in strokes])
+    total = np.array([np.bincount(part[each], force[each], parts) for each in strokes])
+    return strokes, np.where(count >= LEAST_COMPARED_ROWS, total / np.maximum(count, 1), np.nan)
+
+
+def _agreement(force: Float1D, other: Float1D) -> float:
+    """Returns the agreement of a force with the negative other one at their common parts: 1 for equal values,
+    0 with few parts."""
+    shared = np.isfinite(force + other)
+    first, second = force[shared], -other[shared]
+    power = float(first @ first + second @ second)
+    return 2.0 * float(first @ second) / power if len(first) >= 4 and power > 0.0 else 0.0
+
+
 def mirrored_stroke(
     checked: Checked, *, agreement: float, correlation: float, range_share: float
 ) -> list[Finding]:
@@ -114,33 +142,15 @@ def mirrored_stroke(
     cells, recording = checked.cells, checked.recording
     if cells is None:
         return []
-    release = cells.cell >= cells.cells
-    edges = np.flatnonzero(np.diff(release)) + 1
-    if recording.motion.waiting is not None and len(edges) < len(release) // LEAST_STROKE_ROWS:
-        strokes = np.split(np.arange(len(release)), edges)
-    else:  # rows in another order than that of a motion
-        strokes = [np.flatnonzero(~release), np.flatnonzero(release)]
-    # The rows of each stroke are as many in a part of the travel as those of all strokes in a cell.
-    parts = max(2 * cells.cells // len(strokes), 4)
-    part, force = cells.cell % cells.cells * parts // cells.cells, recording.force[cells.row]
-    count = np.array([np.bincount(part[each], minlength=parts) for each in strokes])
-    total = np.array([np.bincount(part[each], force[each], parts) for each in strokes])
-    curves = np.where(count >= LEAST_COMPARED_ROWS, total / np.maximum(count, 1), np.nan)
-
-    def agreed(one: int, other: int) -> float:
-        shared = np.isfinite(curves[one] + curves[other])
-        first, second = curves[one, shared], -curves[other, shared]
-        power = float(first @ first + second @ second)
-        return 2.0 * float(first @ second) / power if len(first) >= 4 and power > 0.0 else 0.0
-
-    found = np.array([agreed(one, one + 2) for one in range(len(strokes) - 2)])
+    strokes, curves = _strokes_of(checked, cells)
+    found = np.array([_agreement(*each) for each in zip(curves, curves[2:], strict=False)])
     # The force of an inertia changes its sign with the speed, so that its strokes do not repeat.
     if (found > agreement).any() and float(np.median(np.abs(found))) > agreement:
         one = int(np.argmax(found > agreement))
         unit, x = recording.file_unit("position"), recording.position[cells.row]
         names = [
-            f"the {('press', 'release')[int(release[each[0]])]} from row {cells.row[each[0]]} on, "
-            f"{unit.interval(float(x[each[0]]), float(x[each[-1]]))}"
+            f"the {('press', 'release')[cells.cell[each[0]] // cells.cells]} from row {cells.row[each[0]]} "
+            f"on, {unit.interval(float(x[each[0]]), float(x[each[-1]]))}"
             for each in (strokes[one], strokes[one + 2])
         ]
         return [
@@ -154,7 +164,7 @@ def mirrored_stroke(
         return []
     # A damper mirrors its force as well, but not at the turn, where it is slow.
     turned = min(abs(each[-1]) / np.abs(each).max() for each in (press, released)) > 0.5
-    similar = min(agreed(0, 1), float(np.corrcoef(press, -released)[0, 1]))
+    similar = min(_agreement(curves[0], curves[1]), float(np.corrcoef(press, -released)[0, 1]))
     if not turned or similar <= correlation:
         return []
     return [
