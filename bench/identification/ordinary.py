@@ -253,26 +253,29 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
         "faultless": error <= reported and place <= 1.0 and not softens,
         "mass_ratio": model.mass / mass if model.mass is not None and mass > 0.0 else None,
         **{name: found[name] == rows.object.classes[name] if known[name] else None for name in found},
-        **of_lag(model, rows, truth, error),
     }
 
 
-def of_lag(model: Model, rows: Rows, truth: Truth, error: float) -> dict[str, Any]:
+def of_lag(model: Model, rows: Rows) -> dict[str, Any]:
     """Returns the lag that the findings propose, divided by the true one, and whether its correction raises
     the error."""
     advice = PROPOSED_LAG.search(f"{model.notes.get('identification', '')} {model.verdict}")
     if advice is None:
         return {"lag_ratio": None, "lag_raises": None}
-    lag_s = float(advice[1])
+    lag_s, truth = float(advice[1]), Truth.of(rows)
     corrected = palpate.identify(rows.recording().with_force_earlier(lag_s))
     return {
         "lag_ratio": lag_s / rows.lag_s if rows.lag_s else None,
-        "lag_raises": truth.error(corrected) > error,
+        "lag_raises": truth.error(corrected) > truth.error(model),
     }
 
 
 def measure(draw: int, pairs: Sequence[Pair] | None = None) -> dict[str, Any]:
-    """Identifies the recording of a draw and its reference fit, and judges the model."""
+    """Identifies the recording of a draw and its reference fit, and judges the model.
+
+    A second reference fit, of the same clean rows with their noise in another order, is judged in the same
+    way: it shows what can be reached with known rows and class.
+    """
     operator, rows = drawn(draw, pairs)
     row: dict[str, Any] = {"draw": draw, "object": rows.object.name, "operator": operator}
     recording: Recording = rows.recording()
@@ -286,15 +289,18 @@ def measure(draw: int, pairs: Sequence[Pair] | None = None) -> dict[str, Any]:
     if in_question and rows.force.max() <= 0.0:
         model = palpate.identify(recording, below="linear")  # the operator answers the question
     try:
-        best = reference(rows)
+        best, again = reference(rows), reference(rows.with_other_noise(np.random.default_rng(draw)))
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "no reference", "reasons": [str(error)]}
+    known = judged(again, best, replace(rows, mirrored=False))
     return {
         **row,
         "rows": len(recording),
         "seconds": seconds,
         "sign_in_question": in_question,
         **judged(model, best, rows),
+        **of_lag(model, rows),
+        "known": {**row, **{name: value for name, value in known.items() if name not in CLASSES}},
     }
 
 
@@ -331,7 +337,7 @@ def _limit_stated(row: Row) -> bool:
 
 
 def _at(key: str) -> Callable[[Row], Any]:
-    return lambda row: row[key]
+    return lambda row: row.get(key)
 
 
 def _good_and(key: str) -> Callable[[Row], bool]:
@@ -407,31 +413,44 @@ def report(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for verdict in ("refused", "no reference"):
         print(f"{verdict}: {sum(row['verdict'] == verdict for row in rows)} of {len(rows)} recordings")
     summary: list[dict[str, Any]] = []
+    of_known = [row["known"] for row in rows if "known" in row]
     for mark in MARKS:
         values = values_of(mark, rows)
         if not len(values):
             continue
-        if np.isin(values, (0.0, 1.0)).all():
-            numbers = {"share": float(np.mean(values))}
-        else:
-            numbers = {"median": float(np.median(values)), "95 %": float(np.percentile(values, 95))}
         met = None if mark.met is None else bool(mark.met(values))
-        judged = {"name": mark.name, "draws": len(values), **numbers, "mark": mark.required, "met": met}
-        summary.append(judged)
+        judged = {"name": mark.name, "draws": len(values), **_numbers(values)}
+        known = _numbers(values_of(mark, of_known))
+        summary.append({**judged, "known": known, "mark": mark.required, "met": met})
     lines = [
         (
             each["name"],
             str(each["draws"]),
-            f"{each['median']:.3g}" if "median" in each else "",
-            f"{each['95 %']:.3g}" if "95 %" in each else "",
-            f"{100.0 * each['share']:.3g} %" if "share" in each else "",
+            *_shown(each),
+            " to ".join(each for each in _shown(each["known"]) if each),
             each["mark"],
             "short" if each["met"] is False else "",
         )
         for each in summary
     ]
-    print(markdown_table(("judged", "draws", "median", "95 %", "share", "mark", ""), lines, (0, 5, 6)))
+    header = ("judged", "draws", "median", "95 %", "share", "known rows and class", "mark", "")
+    print(markdown_table(header, lines, (0, 6, 7)))
     return summary
+
+
+def _numbers(values: Array) -> dict[str, float]:
+    """Returns the share of values (n,) that are only 0 and 1, the median and 95 % of others."""
+    if not len(values):
+        return {}
+    if np.isin(values, (0.0, 1.0)).all():
+        return {"share": float(np.mean(values))}
+    return {"median": float(np.median(values)), "95 %": float(np.percentile(values, 95))}
+
+
+def _shown(numbers: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Returns median, 95 % and share of numbers as texts; empty where there is none."""
+    median, most = (f"{numbers[name]:.3g}" if name in numbers else "" for name in ("median", "95 %"))
+    return median, most, f"{100.0 * numbers['share']:.3g} %" if "share" in numbers else ""
 
 
 def report_of(key: str, rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -106,6 +106,11 @@ class Rows:
         }
         return replace(self, motion=motion, **arrays)
 
+    def with_other_noise(self, random: Generator) -> Rows:
+        """Returns the rows with their unavoidable errors in another order."""
+        noise = (random.permutation(each) for each in (self.position_noise, self.force_noise))
+        return replace(self, **dict(zip(("position_noise", "force_noise"), noise, strict=True)))
+
     def recording(self) -> Recording:
         """Returns the recording as `palpate.read_recording` gives it for the file of the operator."""
         return self._stored(

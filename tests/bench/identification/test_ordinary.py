@@ -314,4 +314,8 @@ def test_the_bench_judges_a_draw_and_writes_its_results(
     assert results["draws"][0]["object"] == drawn(5)[1].object.name == "spring with wall"
     table = capsys.readouterr().out
     assert "error over reference" in table
+    known = results["draws"][0]["known"]
+    assert 0.2 < known["error_ratio"] < 5.0
+    assert known["error_ratio"] != 1.0, "another noise, another fit"
+    assert f"{known['error_ratio']:.3g} to {known['error_ratio']:.3g}" in table
     assert "| variable rate | 1 | 0 |" in table
