@@ -187,6 +187,12 @@ def test_headers_include_only_the_folders_allowed_for_them(path: Path) -> None:
     assert folders <= allowed, f"{name} includes {sorted(folders)}"
 
 
+def test_one_header_reads_the_time() -> None:
+    reads = re.compile(r"_clock\b|clock_gettime|gettimeofday")
+    readers = [path for path in HEADER_FILES if reads.search(path.read_text(encoding="utf-8"))]
+    assert [path.relative_to(HEADERS).as_posix() for path in readers] == ["realtime/periodic.hpp"]
+
+
 @pytest.mark.parametrize("path", HEADER_FILES, ids=lambda path: str(path.relative_to(HEADERS)))
 def test_headers_include_only_the_standard_library_and_no_output_header(path: Path) -> None:
     name = path.relative_to(HEADERS)

@@ -4,12 +4,16 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -20,6 +24,20 @@
 #include <gtest/gtest.h>
 
 #include "support.hpp"
+
+namespace {
+
+/// Time by which a test has moved the monotonic clock of this program [s]
+constinit std::atomic<std::int64_t> moved_s{0};
+
+}  // namespace
+
+/// Replaces the clock of the system.
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+    const int code = static_cast<int>(::syscall(SYS_clock_gettime, clock, time));
+    time->tv_sec += clock == CLOCK_MONOTONIC ? moved_s.load() : 0;
+    return code;
+}
 
 namespace palpate {
 namespace {
@@ -171,6 +189,14 @@ class Client {
         }
         return bytes;
     }
+    /// Waits for the end of the connection, which is an error of the network if the client has not read all bytes.
+    [[nodiscard]] bool leaves_bytes_unread() const {
+        ssize_t got = 1;
+        for (char byte = 0; got > 0;) {
+            got = ::recv(socket_, &byte, 1, 0);
+        }
+        return got < 0;
+    }
     /// Returns head and content of the client's next frame, which must be masked.
     [[nodiscard]] std::pair<unsigned, std::string> received_frame() const {
         const std::string head = received(2);
@@ -243,13 +269,16 @@ Server accepting_server(std::function<void(const Client&)> serve) {
     }};
 }
 
+/// The client receives at most 16 KiB at once.
+const std::string longer_than_a_part(40'000, 'x');
+
 /// Time that ends a wait of a test in which nothing is late.
-WebSocket::Time late() {
-    return WebSocket::Clock::now() + 1min;
+Nanoseconds late() {
+    return monotonic_now() + 60 * nanoseconds_a_second;
 }
 
-WebSocket::Time soon() {
-    return WebSocket::Clock::now() + 5ms;
+Nanoseconds soon() {
+    return monotonic_now() + nanoseconds_a_second / 200;
 }
 
 TEST(WebSocket, MessagesOfEachLengthArriveOnBothSides) {
@@ -447,6 +476,34 @@ TEST(WebSocket, BytesThatNeverMakeAMessageDoNotExtendAWait) {
     }
 }
 
+TEST(WebSocket, AHandshakeThatEndsBehindTheDeadlineIsRefused) {
+    const Server server{[](const Client& client) {
+        (void)client.received_until("\r\n\r\n");
+        moved_s = 3600;
+        client.send("HTTP/1.1 101 " + longer_than_a_part + "\r\n" + std::string{accepting});
+    }};
+    WebSocket socket;
+    EXPECT_EQ(socket.open("127.0.0.1", server.port, late()), "no answer");
+    moved_s = 0;
+}
+
+TEST(WebSocket, BytesBehindTheDeadlineOfACloseAreNotReceived) {
+    std::promise<void> sent;
+    const Server server = accepting_server([&](const Client& client) {
+        client.send(longer_than_a_part);
+        sent.set_value();
+        EXPECT_TRUE(client.leaves_bytes_unread());
+    });
+    WebSocket socket;
+    ASSERT_EQ(socket.open("127.0.0.1", server.port, late()), "");
+    const Nanoseconds until = late();
+    sent.get_future().wait();
+    moved_s = 3600;
+    socket.close(until);
+    EXPECT_FALSE(socket.is_open());
+    moved_s = 0;
+}
+
 TEST(WebSocket, AServerThatNeverReadsDoesNotExtendAWait) {
     const Server server = accepting_server([](const Client& client) {
         while (client.send(frame(ping, std::string(125, 'p')))) {
@@ -485,7 +542,7 @@ TEST(WebSocket, AMessageThatIsLateIsReceivedByALaterWait) {
     WebSocket socket;
     ASSERT_EQ(socket.open("127.0.0.1", server.port, late()), "");
     std::string message = "unchanged";
-    EXPECT_FALSE(socket.receive(message, WebSocket::Clock::now()));
+    EXPECT_FALSE(socket.receive(message, monotonic_now()));
     EXPECT_FALSE(socket.receive(message, soon()));
     EXPECT_EQ(message, "unchanged");
     EXPECT_TRUE(socket.is_open());

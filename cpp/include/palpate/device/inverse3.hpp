@@ -112,7 +112,7 @@ class Inverse3Device {
         ZeroForce zero_force = ZeroForce::NotSent;
         try {
             zero_force = end_force();
-            link_->socket.close(Clock::now() + std::chrono::milliseconds{200});
+            link_->socket.close(after(std::chrono::milliseconds{200}));
         } catch (const std::exception&) {
         }
         link_.reset();
@@ -124,29 +124,32 @@ class Inverse3Device {
     [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
 
   private:
-    using Clock = WebSocket::Clock;
-    using Time = WebSocket::Time;
+    /// Returns the time at which a wait ends.
+    [[nodiscard]] static Nanoseconds after(std::chrono::nanoseconds wait,
+                                           Nanoseconds start = monotonic_now()) noexcept {
+        return start + wait.count();
+    }
 
     /// A connection to the service, and what was sent and received.
     struct Link {
         WebSocket socket;
-        std::string message;         ///< message to the service that was sent last
-        std::string command_head;    ///< start of each command's text, up to the force
-        bool is_wrong = false;       ///< true after a message that differs from the documentation
-        int unanswered = 0;          ///< sent messages that the service has not answered
-        std::string newest_message;  ///< message that the service sent last
-        Time sent = Clock::now();    ///< time at which the last command was sent
+        std::string message;                 ///< message to the service that was sent last
+        std::string command_head;            ///< start of each command's text, up to the force
+        bool is_wrong = false;               ///< true after a message that differs from the documentation
+        int unanswered = 0;                  ///< sent messages that the service has not answered
+        std::string newest_message;          ///< message that the service sent last
+        Nanoseconds sent = monotonic_now();  ///< time at which the last command was sent
         /// Earliest time of the first state that the force of the device does not take into account, now and before the
         /// last answer
-        Time late_from{}, late_from_before{};
+        Nanoseconds late_from = 0, late_from_before = 0;
         Inverse3State state;  ///< state that was read last
         double origin = 0.0;  ///< handle position when the device was opened [m]
         /// Number of consecutive exchanges in which the service reports zero force although a force was commanded
         int states_without_effect = 0;
-        Time start = Clock::now();
+        Nanoseconds start = monotonic_now();
 
         /// Receives the next message of the service, which answers the oldest unanswered one. Returns false without it.
-        [[nodiscard]] bool receive(Time until) {
+        [[nodiscard]] bool receive(Nanoseconds until) {
             const bool received = socket.receive(newest_message, until);
             unanswered = std::max(unanswered - (received ? 1 : 0), 0);
             return received;
@@ -160,7 +163,7 @@ class Inverse3Device {
     /// Connects to the service. Throws an error with the likely cure if no service answers.
     void connect(const std::string& service) {
         const std::string reason =
-            link_->socket.open(settings_.host, settings_.port, Clock::now() + settings_.step_timeout);
+            link_->socket.open(settings_.host, settings_.port, after(settings_.step_timeout));
         if (!reason.empty()) {
             throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + reason +
                                      "): start Haply Hub, or the service itself");
@@ -169,7 +172,7 @@ class Inverse3Device {
 
     /// Waits for the next message of the service while the device is being opened.
     void receive(const std::string& service, const char* failure) {
-        if (!link_->receive(Clock::now() + settings_.step_timeout)) {
+        if (!link_->receive(after(settings_.step_timeout))) {
             throw std::runtime_error("the Haply Inverse Service at " + service + " " + failure +
                                      (link_->socket.is_open() ? "" : ": it ended the connection"));
         }
@@ -201,14 +204,14 @@ class Inverse3Device {
         write_inverse3_command(link_->message, head, link_->command_head, settings_.axis,
                                -settings_.direction * force);
         ++link_->unanswered;
-        link_->sent = Clock::now();
-        link_->socket.send(link_->message, link_->sent + within);
+        link_->sent = monotonic_now();
+        link_->socket.send(link_->message, after(within, link_->sent));
     }
 
     /// Sends a force command and waits for the answer of the service. Returns false without an answer.
     bool is_answered(double force) {
         send_command(force, "{", settings_.answer_timeout);
-        const Time until = link_->sent + settings_.answer_timeout;
+        const Nanoseconds until = after(settings_.answer_timeout, link_->sent);
         while (link_->unanswered > 0 && link_->receive(until)) {
         }
         return link_->unanswered == 0;
@@ -217,8 +220,8 @@ class Inverse3Device {
     /// Reads the messages that arrived since the last exchange. Returns true if one of them answers no command.
     bool skip_waiting_states() {
         const std::uint64_t before = skipped_states_;
-        const Time until = Clock::now() + settings_.answer_timeout;
-        for (Time now = Clock::now(); now < until; now = Clock::now()) {
+        const Nanoseconds until = after(settings_.answer_timeout);
+        for (Nanoseconds now = monotonic_now(); now < until; now = monotonic_now()) {
             const bool is_answer = link_->unanswered > 0;
             if (!link_->receive(now)) {
                 break;
@@ -237,8 +240,8 @@ class Inverse3Device {
             return Status::Fault;
         }
         read_state();
-        const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
-        const Time now = Clock::now();
+        const auto seconds = [](Nanoseconds time) { return 1e-9 * static_cast<double>(time); };
+        const Nanoseconds now = monotonic_now();
         // A skipped state can be the answer to the last command; the one read before it is then older.
         last_.delay = seconds(now - (has_skipped ? link.late_from_before : link.late_from));
         if (answered) {
@@ -260,8 +263,8 @@ class Inverse3Device {
 
     /// Sends zero force until the service reports it, at most for the longest wait of an answer.
     [[nodiscard]] ZeroForce end_force() {
-        const Time until = Clock::now() + settings_.answer_timeout;
-        for (bool answered = true; answered && Clock::now() < until;) {
+        const Nanoseconds until = after(settings_.answer_timeout);
+        for (bool answered = true; answered && monotonic_now() < until;) {
             (void)skip_waiting_states();
             answered = is_answered(0.0);
             if (answered && reports_zero_force()) {

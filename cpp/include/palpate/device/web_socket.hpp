@@ -12,7 +12,6 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -20,6 +19,8 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include "palpate/realtime/periodic.hpp"
 
 namespace palpate {
 
@@ -100,16 +101,13 @@ class WebSocketFrames {
 /// choose the sent bytes, and there is neither here. The answer to the key still proves that the server speaks WebSocket.
 class WebSocket {
   public:
-    using Clock = std::chrono::steady_clock;
-    using Time = Clock::time_point;
-
     WebSocket() = default;
     WebSocket(const WebSocket&) = delete;
     WebSocket& operator=(const WebSocket&) = delete;
     ~WebSocket() { disconnect(); }
 
     /// Connects to a numeric address, once. Returns "", or the reason for which there is no connection.
-    [[nodiscard]] std::string open(const std::string& host, std::uint16_t port, Time until) {
+    [[nodiscard]] std::string open(const std::string& host, std::uint16_t port, Nanoseconds until) {
         std::string reason = connect(host, std::to_string(port), until);
         if (reason.empty()) {
             reason = shake_hands(host + ":" + std::to_string(port), until);
@@ -123,11 +121,11 @@ class WebSocket {
     [[nodiscard]] bool is_open() const noexcept { return socket_ >= 0; }
 
     /// Sends a message. A message that cannot be sent before the deadline ends the connection.
-    void send(std::string_view message, Time until) { send_frame(0x81, message, until); }
+    void send(std::string_view message, Nanoseconds until) { send_frame(0x81, message, until); }
 
     /// Receives the next message, and answers pings. Returns false without a message: the deadline has passed, or the
     /// connection has ended.
-    [[nodiscard]] bool receive(std::string& message, Time until) {
+    [[nodiscard]] bool receive(std::string& message, Nanoseconds until) {
         using Found = WebSocketFrames::Found;
         for (bool is_late = false; is_open();) {
             const Found found = frames_.next(content_);
@@ -145,17 +143,17 @@ class WebSocket {
                 return false;
             } else {
                 frames_.add({part_.data(), received_});
-                is_late = Clock::now() >= until;  // bytes that never make a message do not extend the wait
+                is_late = monotonic_now() >= until;  // bytes that never make a message do not extend the wait
             }
         }
         return false;
     }
 
     /// Closes the connection. Waits until the server has ended it.
-    void close(Time until) { end("\x03\xe8", until); }
+    void close(Nanoseconds until) { end("\x03\xe8", until); }
 
   private:
-    [[nodiscard]] std::string connect(const std::string& host, const std::string& port, Time until) {
+    [[nodiscard]] std::string connect(const std::string& host, const std::string& port, Nanoseconds until) {
         addrinfo wanted{};
         wanted.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
         wanted.ai_socktype = SOCK_STREAM;
@@ -178,7 +176,7 @@ class WebSocket {
         return error == 0 ? "" : std::generic_category().message(error);
     }
 
-    [[nodiscard]] std::string shake_hands(const std::string& service, Time until) {
+    [[nodiscard]] std::string shake_hands(const std::string& service, Nanoseconds until) {
         send_bytes("GET / HTTP/1.1\r\nHost: " + service +
                        "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13"
                        "\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
@@ -186,7 +184,7 @@ class WebSocket {
         std::string answer;
         std::size_t end = std::string::npos;
         while (end == std::string::npos) {
-            if (answer.size() > WebSocketFrames::max_message || Clock::now() >= until ||
+            if (answer.size() > WebSocketFrames::max_message || monotonic_now() >= until ||
                 !receive_bytes(until)) {
                 return "no answer";
             }
@@ -207,17 +205,17 @@ class WebSocket {
     }
 
     /// Waits for an event of the socket. Returns false if the deadline passes before.
-    [[nodiscard]] bool is_ready(short event, Time until) const {
+    [[nodiscard]] bool is_ready(short event, Nanoseconds until) const {
         pollfd file{socket_, event, 0};
         int ready = 0;
-        for (bool is_late = false; ready <= 0 && !is_late; is_late = Clock::now() >= until) {
-            const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
-            ready = ::poll(&file, 1, static_cast<int>(std::max<std::int64_t>(left, 0)));
+        for (bool is_late = false; ready <= 0 && !is_late; is_late = monotonic_now() >= until) {
+            const Nanoseconds left = std::max<Nanoseconds>(until - monotonic_now(), 0);
+            ready = ::poll(&file, 1, static_cast<int>((left + 999'999) / 1'000'000));
         }
         return ready > 0;
     }
 
-    void send_frame(unsigned char head, std::string_view content, Time until) {
+    void send_frame(unsigned char head, std::string_view content, Nanoseconds until) {
         const std::size_t size = content.size();
         const int places = size < 126 ? 0 : size < 65536 ? 2 : 8;
         frame_ = static_cast<char>(head);
@@ -230,7 +228,7 @@ class WebSocket {
         send_bytes(frame_, until);
     }
 
-    void send_bytes(std::string_view bytes, Time until) {
+    void send_bytes(std::string_view bytes, Nanoseconds until) {
         while (is_open() && !bytes.empty()) {
             const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
             if (sent >= 0) {
@@ -243,7 +241,7 @@ class WebSocket {
 
     /// Receives at least one byte into `part_`. Returns false if the deadline passes before, or at the end of the
     /// connection.
-    [[nodiscard]] bool receive_bytes(Time until) {
+    [[nodiscard]] bool receive_bytes(Nanoseconds until) {
         while (is_open()) {
             const ssize_t size = ::recv(socket_, part_.data(), part_.size(), 0);
             if (size > 0) {
@@ -260,9 +258,9 @@ class WebSocket {
     }
 
     /// Sends a close frame with this status, and waits for the end of the connection, which a server must end.
-    void end(std::string_view status, Time until) {
+    void end(std::string_view status, Nanoseconds until) {
         send_frame(0x88, status, until);
-        while (receive_bytes(until) && Clock::now() < until) {
+        while (receive_bytes(until) && monotonic_now() < until) {
         }
         disconnect();
     }
