@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -82,20 +83,28 @@ TEST_P(ExportedModelOf, EveryRandomModelAndStructureIsWithinItsProvedBounds) {
     Random random{17};
     for (int k = 0; k < cases(60); ++k) {
         const ForceModel model = random_model(random);
-        const Scheme scheme = random_scheme(random, model);
+        Scheme scheme = random_scheme(random, model);
         ExportTarget target = random_target(random, GetParam());
         if (scheme.structure == StructureKind::Massless) {  // the lag may be 2^22 counts
             target.encoder_step =
                 std::max(target.encoder_step, target.force_limit / scheme.coupling.stiffness * 0x1p-20);
         }
-        const ExportedModel exported{model, scheme, target};
-        const ExportCheck check = checked_export(exported, 1000, static_cast<std::uint64_t>(k));
+        std::optional<ExportedModel> exported;
+        const std::string refused = test::refusal([&] { exported.emplace(model, scheme, target); });
+        if (!refused.empty()) {
+            // With a soft coupling the force on a load line changes faster than the force law
+            ASSERT_EQ(scheme.structure, StructureKind::Massless) << k << ": " << refused;
+            ASSERT_TRUE(refused.ends_with(": plan a stiffer coupling")) << k << ": " << refused;
+            scheme.coupling.stiffness *= 10.0;
+            exported.emplace(model, scheme, target);
+        }
+        const ExportCheck check = checked_export(*exported, 1000, static_cast<std::uint64_t>(k));
         ASSERT_TRUE(check.passed()) << k << ": " << check.force << " " << check.slope << " " << check.energy
                                     << " " << check.step << ", structure " << name_of(scheme.structure)
                                     << ", predict " << scheme.predict << ", compensated "
                                     << scheme.compensated << ", hysteresis "
-                                    << (model.hysteresis() != nullptr) << ", periodic " << exported.periodic()
-                                    << ", step " << target.encoder_step;
+                                    << (model.hysteresis() != nullptr) << ", periodic "
+                                    << exported->periodic() << ", step " << target.encoder_step;
     }
 }
 
@@ -112,8 +121,13 @@ TEST_P(ExportedModelOf, EveryRandomMemoryIsWithinItsProvedBounds) {
         const ExportCheck check = checked_export(exported, 1000, static_cast<std::uint64_t>(k));
         ASSERT_TRUE(check.passed()) << k << ": " << check.force << " " << check.slope << " " << check.energy
                                     << " " << check.step << ", step " << target.encoder_step;
-        EXPECT_LE(exported.step_error(),
-                  (GetParam() == Precision::Single ? 1e-5 : 1e-8) * exported.largest_force())
+        // The coordinate of the branches moves by one antiderivative less another: each has the error of half a cell,
+        // times the stiffness of the branches. It is large for branches that slip after a small part of a cell.
+        const ExportedMemory& memory = *exported.memory();
+        const double stiffness = std::accumulate(memory.stiffness.begin(), memory.stiffness.end(), 0.0);
+        const double of_branches = exported.law().errors()[1].largest * stiffness * exported.law().widest();
+        EXPECT_LE(exported.step_error(), (GetParam() == Precision::Single ? 2e-6 : 2e-9) *
+                                             (1.0 + of_branches) * exported.largest_force())
             << k;
         EXPECT_FALSE(exported.step_error_lasts());
     }
@@ -174,6 +188,14 @@ TEST(ExportedModel, PeriodicForceRepeatsAtEveryCountOfThe32Bits) {
         const std::int32_t within = ((count % 4096) + 4096) % 4096;
         ASSERT_EQ(force.force(state, count), force.force(state, within)) << count;
     }
+}
+
+TEST(ExportedModel, CoarseCountsOfAPeriodAddNoError) {
+    Random random{26};
+    const ForceModel model = random_periodic_model(random);
+    const ExportedModel fine{model, direct(), {1.0 / 4096.0, 0.0}};
+    const ExportedModel coarse{model, direct(), {1.0 / 8.0, 0.0}};
+    EXPECT_EQ(coarse.force_error(), fine.force_error());
 }
 
 TEST(ExportedModel, FirstStepStartsAtRest) {

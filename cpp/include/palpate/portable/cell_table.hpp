@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -139,10 +140,14 @@ class CellTable {
                 return;
             }
         }
-        throw std::invalid_argument(
-            "the force changes too fast near " + readable(from) + ": no table has the required accuracy" +
-            (curves_[0].has_load_line() ? ", or the load line has several solutions: plan a stiffer coupling"
-                                        : ": identify the model with wider wavelets"));
+        refuse("the force changes too fast near " + readable(from) + ": no table has the required accuracy" +
+               (curves_[0].has_load_line() ? ", or the load line has several solutions" : ""));
+    }
+
+    [[noreturn]] void refuse(const std::string& reason) const {
+        throw std::invalid_argument(reason + (curves_[0].has_load_line()
+                                                  ? ": plan a stiffer coupling"
+                                                  : ": identify the model with fewer or wider wavelets"));
     }
 
     /// Returns a distance from the domain that contains every rounding of a position at an end of the domain [m].
@@ -188,8 +193,7 @@ class CellTable {
     void store(const std::vector<Cell>& made, unsigned k) {
         splits_.push_back(static_cast<std::uint32_t>(cells() << 4U) | k);
         if (cells() + made.size() > most_cells) {
-            throw std::invalid_argument("the table needs more than " + std::to_string(most_cells) +
-                                        " cells: identify the model with fewer or wider wavelets");
+            refuse("the table needs more than " + std::to_string(most_cells) + " cells");
         }
         const double width = grid_.width(k);
         for (const Cell& cell : made) {
@@ -234,7 +238,8 @@ class CellTable {
                                                  width;
         all.value = std::max(all.value, value);
         all.slope = std::max(all.slope, slope);
-        all.integral = std::max(all.integral, value * width);
+        // An antiderivative starts in the middle of its cell
+        all.integral = std::max(all.integral, 0.5 * value * width);
         all.largest = std::max(all.largest, largest + value);
         all.steepest = std::max(all.steepest, p.steepest() / width + slope);
     }
@@ -250,18 +255,27 @@ class CellTable {
     std::vector<CurveErrors> errors_;
 };
 
-/// Returns the table with the fewest bytes among those with 32 to 256 coarse cells.
+/// Returns the table with the fewest bytes among those with 32 to 256 coarse cells. A force that needs too many cells with
+/// few coarse cells can have a table with more of them.
 [[nodiscard]] inline CellTable smallest_table(const std::vector<ResponseCurve>& curves, double encoder_step,
                                               bool fractions, Precision precision) {
     std::optional<CellTable> best;
+    std::exception_ptr refusal;
     for (unsigned bits = 5; bits <= 8; ++bits) {
         const CellGrid grid{
             encoder_step, curves[0].lower(), curves[0].upper(), curves[0].periodic(), fractions, precision,
             bits};
-        CellTable table{curves, grid, precision, fractions, TableTolerance::of(precision)};
-        if (!best || table.bytes() < best->bytes()) {
-            best = std::move(table);
+        try {
+            CellTable table{curves, grid, precision, fractions, TableTolerance::of(precision)};
+            if (!best || table.bytes() < best->bytes()) {
+                best = std::move(table);
+            }
+        } catch (const std::invalid_argument&) {
+            refusal = std::current_exception();
         }
+    }
+    if (!best) {
+        std::rethrow_exception(refusal);
     }
     return *best;
 }

@@ -263,9 +263,11 @@ class ExportedModel {
         const std::vector<CurveErrors>& curves = law_.errors();
         // Outside the domain: rounding of value and distance at the end of the domain
         double at_ends = 0.0;
-        for (std::size_t n = 0; n < curves.size(); ++n) {
-            for (const ExportedLine& line : lines_[n]) {
-                at_ends += 4.0 * u * std::abs(line.value) + 4.0 * std::abs(line.gain) * u;
+        if (!periodic()) {
+            for (const std::array<ExportedLine, 2>& pair : lines_) {
+                for (const ExportedLine& line : pair) {
+                    at_ends += 4.0 * u * (std::abs(line.value) + std::abs(line.gain));
+                }
             }
         }
         force_error_ = curves[0].value;
