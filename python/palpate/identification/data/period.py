@@ -14,7 +14,6 @@ from ...recording import Recording
 from ...recording.conversion import MIN_ROWS
 from ...recording.motion import directions_of
 from .limits import LEAST_GAIN, standard_deviation
-from .strokes import turns_before
 
 REVOLUTION = 2.0 * np.pi
 """Period of every force over the angle of a shaft that turns without end [rad]."""
@@ -56,8 +55,7 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
     (wave, count), orders = repeat, np.arange(1, HARMONICS + 1)
     wave, weight = _fitted(box, share, way, wave, orders, cells)
     # Friction that reverses at the same turns of each cycle looks like a longer period.
-    settled = _settled(way, weight > 0.0)
-    box, share, way = box[settled], share[settled], way[settled]
+    box, share, way = (each[weight > 0.0] for each in (box, share, way))
     # Rounded positions shift the force of each row; where the rounding repeats, so does its error.
     curve = _curve(np.mod(box / wave, 1.0), share, max(round(cells * wave), 1))
     step = cells * float(np.median(np.diff(np.unique(box))))
@@ -161,14 +159,6 @@ def _fitted(
         scale = max(BIWEIGHT * standard_deviation(residual), tiny)
         weight = np.maximum(1.0 - (residual / scale) ** 2, 0.0)
     return period, weight
-
-
-def _settled(way: Float1D, fitted: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Returns False (n,) for the rows between a turn and the first fitted row behind it."""
-    row, stroke, _ = turns_before(way)
-    first = np.full(stroke[-1] + 1, len(way))
-    np.minimum.at(first, stroke, np.where(fitted, row, len(way)))
-    return np.asarray(row >= first[stroke])
 
 
 def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:

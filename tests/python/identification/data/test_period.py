@@ -72,6 +72,19 @@ def test_friction_that_reverses_and_wrong_readings_do_not_shift_the_period(trave
     assert period_of([Recording.from_arrays(angle, torque)]) == pytest.approx(15.0, rel=3e-5)
 
 
+@pytest.mark.parametrize("seed", [1, 14])
+def test_friction_of_a_hand_that_trembles_while_it_holds_does_not_lengthen_the_period(seed: int) -> None:
+    random, step = np.random.default_rng(seed), 0.005
+    start = random.uniform(0.0, 5.0)
+    time = np.arange(0.0, 73.0, step)
+    hold = np.interp(time, [0.0, 36.0, 36.5, 72.5], [start, start + 1080.0, start + 1080.0, start])
+    angle = hold + 0.15 * np.sin(2.0 * np.pi * 0.7 * time + seed)
+    torque = knob(angle) + 2.5 * np.tanh(np.gradient(angle, step) / 2.0) + random.normal(0.0, 0.25, len(time))
+    assert period_of(
+        [Recording.from_arrays(np.round(angle * 4096 / 360) / 4096 * 360, torque)]
+    ) == pytest.approx(15.0, rel=3e-5)
+
+
 def detents_of_motor(angle: Array, friction: float) -> Recording:
     """Returns two cycles of a motor with 84 waves a turn; its friction reverses over half a degree."""
     state = (angle - play(angle, 0.25, start=0.0)) / 0.25
