@@ -278,8 +278,20 @@ def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] |
     first = np.maximum(np.minimum(first, np.arange(len(x)) - 1), 0)
     slow = travelled - travelled[first] < SLOW_RATIO * speed * (tick - tick[first])
     slow[0] = slow[1]
+    # A tool that trembles within the noise while it waits is slow over a longer way.
+    row, lasting = np.arange(len(x)), band / SLOW_RATIO / speed
+    before = np.maximum(row - 1, 0)
+    first = np.searchsorted(tick, tick - lasting)
+    last = np.searchsorted(tick, tick[before] + lasting, side="right") - 1
+    waiting = slow.copy()
+    for begin, end in ((first, row), (before, np.maximum(last, row))):
+        waiting |= travelled[end] - travelled[begin] < SLOW_RATIO * speed * (tick[end] - tick[begin])
     found = np.zeros(len(x), dtype=bool)
-    for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
+    for begin, end in np.flatnonzero(np.diff(waiting, prepend=False, append=False)).reshape(-1, 2).tolist():
+        rows = begin + np.flatnonzero(slow[begin:end])
+        if not len(rows):
+            continue
+        begin, end = int(rows[0]), int(rows[-1]) + 1
         # The tool stops between two rows: the last row that moves less than half of a step waits as well.
         moved_there = travelled[begin - 1] - travelled[begin - 2]
         stopped = begin > 1 and moved_there < 0.5 * speed[begin - 1] * (tick[begin - 1] - tick[begin - 2])

@@ -178,6 +178,17 @@ def test_a_wait_of_a_noisy_position_is_found(deviation: float) -> None:
     assert np.count_nonzero(found[330:-330]) == 0
 
 
+@pytest.mark.parametrize("steps", [1.0, 1.7, 2.5])
+def test_a_hand_that_trembles_while_it_waits_waits_all_the_time(steps: float) -> None:
+    encoder, press = 1.0 / 12_000, np.linspace(0.0, 1.0, 7200)
+    trembling = steps * encoder * np.sin(2.0 * np.pi * 0.7 * np.arange(100) / 200.0)
+    position = np.concatenate([press, 1.0 + trembling, press[::-1], trembling])
+    found = np.flatnonzero(waits(np.round(position / encoder) * encoder))
+    waiting = np.r_[7200:7300, 14_500:14_600]
+    assert len(np.intersect1d(found, waiting)) >= 190
+    assert len(np.setdiff1d(found, waiting)) <= 2
+
+
 def test_a_settling_position_waits_if_the_hold_is_sampled_at_a_lower_rate() -> None:
     settling = 1.0 + 0.002 * (1.0 - np.exp(-np.arange(50) / 10.0))
     position = np.concatenate([np.linspace(0.0, 1.0, 200), settling, np.full(400, settling[-1])])
