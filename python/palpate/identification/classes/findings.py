@@ -16,7 +16,7 @@ from ...recording.motion import noise_band, strokes_from_order, turns_of
 from ...recording.roles import counts_text, role_counts
 from ...verdict import Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
-from ..data.rows import Rows, period_notes
+from ..data.rows import Rows, modulo, period_notes
 from ..data.strokes import weights_of_shared_errors
 from ..log import Decision, Log, causes_of_crossing, latest, not_tested, shifted_strokes
 from ..network.constraints import COMPARED_POSITIONS
@@ -162,12 +162,12 @@ def judged_network(network: FittedNetwork, rows: Rows) -> Judged:
 
 def place_findings(best: Judged) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
-    hand feels the difference."""
+    hand feels the difference. A place is one of the travel: the repeats of a periodic force can differ."""
     rows = np.flatnonzero(best.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
     data, residual, weight = best.data, best.residual[rows], best.weight[rows]
-    group = places_of(data.box[rows], None if best.side is None else best.side[rows])
+    group = places_of(data.along[rows], None if best.side is None else best.side[rows])
     mean, force, square = means_at(group, weight, residual, data.force[rows], residual**2)
     count, places = np.bincount(group, weight, len(mean)), len(mean) // 2
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1.0, 1.0))
@@ -177,14 +177,20 @@ def place_findings(best: Judged) -> list[Finding]:
     if noticed[worst] <= MOST_JND:
         return []
     stroke = "" if best.side is None else (" of the release" if worst >= places else " of the press")
-    middle, unit = (worst % places + 0.5) / places, data.force_unit
+    middle = data.path.min() + np.ptp(data.path) * (worst % places + 0.5) / places
+    box, unit = middle if data.period is None else modulo(middle), data.force_unit
     more = _more_inputs(bool(data.parts), data.side is not None)
     reason = (
         f"the force there depends on more than {best.inputs}, such as earlier motion{best.pinched}: {more}"
     )
+    if data.period is not None:
+        reason = (
+            "the repeats of the force differ, or its zero moved. For a force that does not repeat give "
+            "--inputs position,hysteresis"
+        )
     if best.hysteresis is not None and best.passive:
         loop = (
-            2.0 * best.hysteresis(np.array([[middle]]))[0]
+            2.0 * best.hysteresis(np.array([[box]]))[0]
             + mean[worst % places]
             - mean[worst % places + places]
         )

@@ -111,6 +111,11 @@ class Rows:
         return self.path if self.period is None else modulo(self.path)
 
     @property
+    def along(self) -> Float2D:
+        """(n, d) positions in the unit box, those of a periodic force law in the whole travel."""
+        return self.path if self.period is None else (self.path - self.path.min()) / np.ptp(self.path)
+
+    @property
     def direction(self) -> Float1D | None:
         """(n,) direction of each row, from `order` if `side` is not known; None if neither is known."""
         return self.order if self.side is None else self.side
