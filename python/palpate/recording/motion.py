@@ -491,9 +491,11 @@ def position_noise(parts: Sequence[Piece]) -> float | None:
 
 
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
-    """Returns the low-pass with the highest cutoff that leaves at most NOISE_SHARE of noise in a derivative.
+    """Returns the low-pass with the highest cutoff that leaves at most NOISE_SHARE of noise in a derivative;
+    None without one, or if an acceleration is not above this share between the turns of the tool.
 
-    The noise of the derivative follows from the impulse response of both filters.
+    The noise of the derivative follows from the impulse response of both filters. Between turns at constant
+    speed there is nothing else, and at the turns friction reverses too.
     """
     if (noise := position_noise(parts)) is None:
         return None
@@ -501,22 +503,40 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     duration = sum(part.period * len(part.time) for part in parts)
     low_pass = LowPass(HIGHEST_CUTOFF / parts[0].period)
     while low_pass.cutoff * duration > LEAST_TIME_CONSTANTS:
-        moving = [
-            low_pass(derive(part.position, part.period), part.period)[low_pass.margin(part.period) :][
-                : -low_pass.margin(part.period)
-            ]
-            for part in long_enough(parts, low_pass)
-        ]
+        moving = long_enough(parts, low_pass)
         if not moving:
             return None
-        period = parts[0].period
+        margins = [low_pass.margin(part.period) for part in moving]
+        squares = [
+            low_pass(derive(part.position, part.period), part.period)[margin:-margin] ** 2
+            for part, margin in zip(moving, margins, strict=True)
+        ]
+        period, accepted = parts[0].period, NOISE_SHARE * float(np.mean(np.concatenate(squares)))
         impulse = np.zeros(2 * low_pass.margin(period) + 5)
         impulse[len(impulse) // 2] = 1.0
         passed = float(np.sum(low_pass(derive(impulse, period), period) ** 2))
-        if noise * passed <= NOISE_SHARE * float(np.mean(np.concatenate(moving) ** 2)):
-            return low_pass
+        if noise * passed <= accepted:
+            if order == 1:
+                return low_pass
+            of_parts = zip(moving, margins, squares, strict=True)
+            between = np.concatenate(
+                [
+                    square[~_near_turns(part.position, margin)[margin:-margin]]
+                    for part, margin, square in of_parts
+                ]
+            )
+            return low_pass if not len(between) or np.mean(between) > accepted else None
         low_pass = LowPass(CUTOFF_RATIO * low_pass.cutoff)
     return None
+
+
+def _near_turns(position: Float1D, rows: int) -> NDArray[np.bool_]:
+    """Returns True (k,) for the rows of a motion (k,) with a turn among a number of rows before or behind."""
+    direction = strokes_from_order(position)
+    near = np.zeros(len(position), dtype=bool)
+    for turn in [] if direction is None else np.flatnonzero(np.diff(direction)).tolist():
+        near[max(turn - rows, 0) : turn + rows + 2] = True
+    return near
 
 
 def least_error_low_pass(parts: Sequence[Piece], *, order: int) -> SplineLowPass | None:

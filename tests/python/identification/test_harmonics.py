@@ -86,6 +86,20 @@ def test_periods_on_top_of_each_other_do_not_make_orders_that_the_recording_does
     assert model.orders.max(initial=0.0) <= rows_in_a_period / 2.0
 
 
+def test_a_worn_detent_makes_a_periodic_model_no_good_one() -> None:
+    """The mean of twelve detents, one of them 70 % as high, was called good."""
+    angle = np.radians(np.r_[np.linspace(0.0, 360.0, 800), np.linspace(360.0, 0.0, 800)])
+    height = np.where((np.degrees(angle) >= 150.0) & (np.degrees(angle) < 180.0), 0.07, 0.1)
+    force = height * np.sin(12.0 * angle) + np.repeat([0.02, -0.02], 800)
+    model = identify(recorded(angle, force, 0.002))
+    assert model.period == pytest.approx(np.radians(30.0), rel=0.01)
+    (reason,) = model.verdict.reasons
+    assert "the repeats of the force differ" in reason
+    place = float(reason.removeprefix("at ").split()[0])
+    assert np.radians(150.0) < place < np.radians(180.0)
+    assert identify(recorded(angle, force, 0.002), inputs=("position", "hysteresis")).verdict.level == "good"
+
+
 @pytest.mark.parametrize("criterion", ["aicc", "fresh", "perceptual"])
 def test_every_criterion_chooses_among_the_orders(criterion: str) -> None:
     model = identify(map_of_a_turn(256), period=TURN, criterion=criterion)

@@ -222,6 +222,15 @@ def test_a_stroke_that_ends_early_is_reported() -> None:
     )
 
 
+def test_a_release_that_ends_early_needs_no_direction_to_be_reported() -> None:
+    """The hysteresis of half of the travel was extrapolated, and the model called good."""
+    x = np.r_[np.linspace(0.0, 4e-3, 400), np.linspace(4e-3, 2e-3, 200)]
+    force = 800.0 * x + np.repeat([0.1, -0.1], [400, 200])
+    verdict = palpate.identify(palpate.Recording.from_arrays(x, force)).verdict
+    assert verdict.level == "usable"
+    assert "the release stroke has no rows from 0 to 0.00" in str(verdict)
+
+
 def test_a_force_that_lets_go_does_not_fall_over_the_whole_file() -> None:
     """The force of a suction cup rises over 9 mm of 14 mm; the tool then returns in one step."""
     x = np.tile(np.linspace(0.0, 14.0, 400), 3)

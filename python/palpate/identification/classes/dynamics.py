@@ -124,6 +124,9 @@ SHORT_MOTION = "the motion of the recording between gaps of time is too short or
 """Text of the decision that damping and mass are not tested, if the recorded motion is too short or too
 noisy."""
 
+CONSTANT_SPEEDS = "between its turns the tool does not accelerate above the noise of the position"
+"""Text of the decision that mass is not tested, if the recording shows no acceleration."""
+
 LEAST_SHARE = 1e-9
 """Least weight of a row before the low-pass filter [-]."""
 
@@ -265,7 +268,7 @@ class Dynamics:
             f"if each stroke is half a period of a sine, a mass above {mass} changes the force by more than "
             "a just noticeable difference"
         )
-        return Decision("mass", "not tested", f"{SHORT_MOTION}; {limit}")
+        return Decision("mass", "not tested", f"{CONSTANT_SPEEDS}; {limit}")
 
     def _unit_of(self, name: str) -> str:
         return unit_of_dynamics(name, self._data.force_unit.si, self._data.position_unit.si)

@@ -190,9 +190,7 @@ def place_findings(best: Judged) -> list[Finding]:
         )
     if best.hysteresis is not None and best.passive:
         loop = (
-            2.0 * best.hysteresis(np.array([[box]]))[0]
-            + mean[worst % places]
-            - mean[worst % places + places]
+            2.0 * best.hysteresis(np.array([[box]]))[0] + mean[worst % places] - mean[worst % places + places]
         )
         if loop < 0.0:
             reason = (

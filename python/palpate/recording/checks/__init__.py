@@ -94,7 +94,7 @@ CHECKS = (
         "positions without rows",
         position_gaps,
         "lost rows, a stroke that ends early, one wrong position in a table without order",
-        {"gap_share": 0.02, "gap_ratio": 8.0, "end_share": 0.05, "named": 2},
+        {"gap_share": 0.02, "gap_ratio": 8.0, "stroke_share": 0.05, "named": 2},
     ),
 )
 """All checks, in the order of their findings. Each threshold is described in its function."""

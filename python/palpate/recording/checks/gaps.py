@@ -6,28 +6,29 @@ from __future__ import annotations
 import numpy as np
 
 from ...verdict import FORCE_FLOOR, Finding, usable
+from ..motion import directions_of
 from .cells import Checked
 
 
 def position_gaps(
-    checked: Checked, *, gap_share: float, gap_ratio: float, end_share: float, named: int
+    checked: Checked, *, gap_share: float, gap_ratio: float, stroke_share: float, named: int
 ) -> list[Finding]:
-    """Returns findings on intervals of position without rows, of the recording and of each stated stroke.
+    """Returns findings on intervals of position without rows, of the recording and of each stroke.
 
     Parameters
     ----------
     gap_share, gap_ratio : float
         Least width of an interval, over the travel and over the 90th percentile of the distances of adjacent
         positions [-].
-    end_share : float
-        Share of the travel that a stroke may miss at its ends [-].
+    stroke_share : float
+        The same over the travel for one of the strokes, and the longest motion that is not a stroke [-].
     named : int
         Largest number of intervals whose limits are stated.
     """
     recording, travel = checked.recording, checked.travel
     if not travel > 0.0 or recording.input_names:
         return []
-    way, unit = recording.direction, recording.file_unit("position")
+    way, unit = directions_of(recording), recording.file_unit("position")
     force = np.abs(recording.force)
     # Between rows before the first noticeable force the tool is in air: there the force is known.
     contact = recording.position[force >= FORCE_FLOOR * force.max()].min()
@@ -40,17 +41,15 @@ def position_gaps(
     found: list[Finding] = []
     reported: set[tuple[float, float]] = set()
     for name, positions in strokes.items():
-        at = np.unique(positions)
-        if len(at) < 10:
+        if len(np.unique(positions)) < 10 or np.ptp(positions) <= stroke_share * travel:
             continue
+        at = np.unique(np.r_[checked.lower, positions, checked.upper])
         distances = np.diff(at)
-        bound = max(gap_share * travel, gap_ratio * float(np.percentile(distances, 90.0)))
+        share = gap_share if name == "recording" else stroke_share
+        bound = max(share * travel, gap_ratio * float(np.percentile(distances, 90.0)))
         gaps = [(float(at[k]), float(at[k + 1])) for k in np.flatnonzero(distances > bound)]
-        gaps = [gap for gap in gaps if gap[1] >= contact]
-        gaps = [gap for gap in gaps if gap not in reported]
+        gaps = [gap for gap in gaps if gap[1] >= contact and gap not in reported]
         reported.update(gaps)
-        ends = ((checked.lower, float(at[0])), (float(at[-1]), checked.upper))
-        gaps += [(start, stop) for start, stop in ends if stop - start > end_share * travel]
         if not gaps:
             continue
         longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:named]
