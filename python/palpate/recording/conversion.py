@@ -24,6 +24,7 @@ from .looks import clock_seconds
 from .motion import waits
 from .revolutions import continued_angle
 from .rows import RowCheck
+from .stamps import between_steps, increases
 from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import CLOCK, COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
 
@@ -198,26 +199,35 @@ class Conversion:
         return [name for name in (self.direction, self.status) if name is not None]
 
     def read(self, table: Table) -> tuple[Conversion, dict[str, Cells]]:
-        """Returns all cells, with clock times in seconds.
+        """Returns all cells, with clock times in seconds, and between the steps of the clock if it is slower
+        than the rows.
 
-        A clock that the caller does not name and that repeats a time is not read; the returned conversion
-        then has no time.
+        A clock that the caller does not name and that makes too few steps is not read; the returned
+        conversion then has no time.
         """
-        clock = self.choice.time if self.choice.time and self.choice.time.unit is CLOCK else None
-        numbers = [name for name in self.numbers if clock is None or name != clock.name]
-        cells = table.read(numbers=numbers, text=[*self.text, *([clock.name] if clock else [])])
-        if clock is None:
+        choice, time = self.choice, self.choice.time
+        clock = time is not None and time.unit is CLOCK
+        numbers = [name for name in self.numbers if not clock or name != time.name]
+        cells = table.read(numbers=numbers, text=[*self.text, *([time.name] if clock else [])])
+        if time is None:
             return self, cells
-        seconds = clock_seconds(cells[clock.name])
-        cells[clock.name] = seconds
-        steps = np.diff(seconds[np.isfinite(seconds)])
-        if self.time_is_named or (steps > 0).all():
-            return self, cells
-        sentence = (
-            f"column {clock.name} repeats a time, so it is not read as time, and damping and memory are not "
-            "tested; record fractions of a second, or state the rate by a column of times in s"
-        )
-        return replace(self, choice=replace(self.choice, time=None, unread_time=sentence)), cells
+        if clock:
+            cells[time.name] = clock_seconds(cells[time.name])
+        cells[time.name], step = between_steps(cells[time.name])
+        if step > 0.0:
+            unit = time.unit or UNSTATED_UNIT
+            note = (
+                f"the clock of column {time.name} has steps of {unit.text(unit.factor * step)}: the rows "
+                "between them are evenly spaced"
+            )
+            choice = replace(choice, notes=(*choice.notes, note))
+        elif clock and not self.time_is_named and not increases(cells[time.name]):
+            sentence = (
+                f"column {time.name} repeats a time, so it is not read as time, and damping and memory are "
+                "not tested; record fractions of a second, or state the rate by a column of times in s"
+            )
+            choice = replace(choice, time=None, unread_time=sentence)
+        return replace(self, choice=choice), cells
 
     @property
     def units(self) -> dict[str, str]:
