@@ -206,11 +206,11 @@ class Conversion:
         conversion then has no time.
         """
         choice, time = self.choice, self.choice.time
-        clock = time is not None and time.unit is CLOCK
+        if time is None:
+            return self, table.read(numbers=self.numbers, text=self.text)
+        clock = time.unit is CLOCK
         numbers = [name for name in self.numbers if not clock or name != time.name]
         cells = table.read(numbers=numbers, text=[*self.text, *([time.name] if clock else [])])
-        if time is None:
-            return self, cells
         if clock:
             cells[time.name] = clock_seconds(cells[time.name])
         cells[time.name], step = between_steps(cells[time.name])

@@ -176,6 +176,13 @@ def test_a_coarse_sensor_is_not_a_slower_one(noise_steps: float) -> None:
     ).any()
 
 
+def test_a_slower_position_at_a_constant_speed_is_not_a_coarse_one() -> None:
+    """A tester that reads its position every 20 ms got the verdict "no" after a minute."""
+    x = np.abs((np.arange(6000) / 1000.0 + 1.0) % 2.0 - 1.0)
+    position = at_a_slower_rate(x + np.random.default_rng(3).normal(0.0, 1e-4, len(x)), 20)
+    assert np.count_nonzero(~repeated_rows(palpate.Recording.from_arrays(position, 3.0 * x**2))) == 300
+
+
 def test_a_relaxation_hold_keeps_its_rows_when_the_position_sensor_is_slower() -> None:
     random = np.random.default_rng(2)
     x = np.r_[np.linspace(0.0, 1.0, 500), np.full(2000, 1.0)] + random.normal(0.0, 1e-4, 2500)

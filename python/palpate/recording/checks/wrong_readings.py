@@ -59,11 +59,14 @@ def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
 
 def _rows_held(values: Float1D) -> int:
     """Returns the number of rows for which a slower sensor keeps a value (n,); 1 for a sensor that is not
-    slower. The values of a coarse sensor mostly change by one step."""
+    slower. The values of a coarse sensor mostly change to a neighbouring one; those of a slower sensor at a
+    constant speed change by one distance too, but other strokes have values between them."""
     steps = np.abs(np.diff(values))
     rows = np.diff(np.flatnonzero(steps))
-    steps = steps[steps > 0.0]
-    if len(rows) < LOCAL_ROWS or np.median(steps) <= TURN_STEPS * steps.min():
+    if len(rows) < LOCAL_ROWS:
+        return 1
+    apart = resolution_of(np.sort(values) / float(np.ptp(values))) * float(np.ptp(values))
+    if np.median(steps[steps > 0.0]) <= TURN_STEPS * apart:
         return 1
     return 1 + int(np.median(rows)) if np.mean(rows > 1) >= HELD_SHARE else 1
 
