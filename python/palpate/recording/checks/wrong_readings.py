@@ -65,8 +65,8 @@ def _rows_held(values: Float1D) -> int:
     rows = np.diff(np.flatnonzero(steps))
     if len(rows) < LOCAL_ROWS:
         return 1
-    apart = resolution_of(np.sort(values) / float(np.ptp(values))) * float(np.ptp(values))
-    if np.median(steps[steps > 0.0]) <= TURN_STEPS * apart:
+    scale = float(np.abs(values).max())
+    if np.median(steps[steps > 0.0]) / scale <= TURN_STEPS * resolution_of(np.sort(values / scale)):
         return 1
     return 1 + int(np.median(rows)) if np.mean(rows > 1) >= HELD_SHARE else 1
 
