@@ -34,7 +34,7 @@ from ..options import IdentifyOptions
 from ..search.evidence import deviance, on_fitted_rows
 from .causes import first_strokes
 from .class_selection import VELOCITY_INPUTS
-from .findings import USABLE_NRMSE, drift_findings, judged_network, place_findings
+from .findings import UNFIT_NRMSE, USABLE_NRMSE, drift_findings, judged_network, place_findings
 from .memory_fit import CURVE_POINTS, MemoryFit, Motion, Ranges, Resting, Shape
 
 MOST_ROWS = 12_000
@@ -381,6 +381,11 @@ def _with_memory(
         [part.force - law.force_over_time(part.time_or_row, part.position)[0] for part in recordings]
     )
     of_all = _rms(of_rows, recorded.weight)
+    if of_all > UNFIT_NRMSE * recorded.judged_spread:
+        nrmse = of_all / recorded.judged_spread
+        return (
+            f"where the tool is free it loses contact: NRMSE {nrmse:.3g}, at most {UNFIT_NRMSE:g} is usable"
+        )
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error = max(where_sure, of_all)

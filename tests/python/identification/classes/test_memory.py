@@ -268,6 +268,19 @@ def test_a_memory_that_forgets_while_the_tool_is_away_states_it() -> None:
     assert remembers.fit.nrmse < 0.05
 
 
+def test_a_memory_that_never_touches_the_object_is_refused() -> None:
+    """A metal that yields and springs back at 20 times the slope: in contact, branches that relax fit it."""
+    time = np.concatenate([np.arange(0.0, 5.0, 0.01), np.arange(5.0, 25.0, 0.4), np.arange(25.0, 30.0, 0.01)])
+    depth = np.interp(time, [0.0, 5.0, 25.0, 30.0], [0.0, 0.05, 0.3, 0.25])
+    force = np.where(time < 25.0, 2400.0 * (1.0 - np.exp(-depth / 0.015)), 2400.0 - (0.3 - depth) * 48_000.0)
+    force += np.random.default_rng(2).normal(0.0, 2.0, len(time))
+    model = palpate.identify(1e-3 * depth, force, time=time)
+    assert model.memory is None
+    assert model.fit.nrmse < 0.3
+    assert model.verdict.level == "usable"
+    assert "where the tool is free" in str(model.notes["model_selection"])
+
+
 @pytest.mark.full
 def test_plasticity_at_one_speed_is_not_stated_to_be_relaxation() -> None:
     """Cycles of growing depth at one speed, without a pause: time and motion cannot be separated."""
