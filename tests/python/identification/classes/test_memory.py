@@ -278,7 +278,7 @@ def test_a_memory_that_never_touches_the_object_is_refused() -> None:
     assert model.memory is None
     assert model.fit.nrmse < 0.3
     assert model.verdict.level == "usable"
-    assert "where the tool is free" in str(model.notes["model_selection"])
+    assert "memory: not accepted (contact is lost" in str(model.notes["model_selection"])
 
 
 @pytest.mark.full
