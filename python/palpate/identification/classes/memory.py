@@ -383,9 +383,7 @@ def _with_memory(
     of_all = _rms(of_rows, recorded.weight)
     if of_all > UNFIT_NRMSE * recorded.judged_spread:
         nrmse = of_all / recorded.judged_spread
-        return (
-            f"contact is lost while the tool presses: NRMSE {nrmse:.3g}, at most {UNFIT_NRMSE:g} is usable"
-        )
+        return f"contact is lost while the tool presses: NRMSE {nrmse:.3g}, at most {UNFIT_NRMSE:g} is usable"
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error = max(where_sure, of_all)
