@@ -17,6 +17,7 @@
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/tangent_inequalities.hpp"
 
 // Searches motions that take energy out of a tangent. Structure, force limit and certificate are those of the library;
 // the energies are counted here: e = integral of F dx + b v^2 dt + f_c |dx| must stay above -(V_0 - min V).

@@ -6,6 +6,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -18,7 +19,7 @@ namespace palpate::bindings {
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
 
-/// True for an optional struct with a table of fields. Its values in a dict are a dict.
+/// True for an optional struct with a table of fields.
 template <class V>
 inline constexpr bool is_optional_part = false;
 template <HasFields V>
@@ -58,13 +59,15 @@ auto argument_of(const T& standard) {
     }
 }
 
-/// Returns all fields of a struct as a Python dict.
-template <class T>
-pybind11::dict dict_of(const T& object) {
-    pybind11::dict values;
-    for_each_field<T>([&](const auto& field) { values[field.name] = to_python(field.of(object)); });
-    return values;
-}
+/// Field of a struct in the dict of a Python object.
+struct FieldKey {
+    const char* name = "";
+    bool stored = true;    ///< false: not written to files
+    bool is_part = false;  ///< true: an optional struct with a table of fields, which is a dict in a file
+};
+
+/// Adds to_dict, pickling, copying, comparison, hash and, if `with_repr` is true, repr to a Python class.
+void bind_protocol(pybind11::object type, std::vector<FieldKey> keys, bool with_repr);
 
 /// Makes a C++ struct a Python class, from the table of the struct's fields: keyword arguments, attributes, `to_dict`,
 /// pickling, copying, comparison, hash and repr. `with_repr` is false for a class that defines its repr separately;
@@ -86,52 +89,16 @@ void bind_fields(
                  }),
                  py::kw_only(), argument_of<T, k, required>(standard)...);
     }(std::make_index_sequence<n>{});
+    std::vector<FieldKey> keys;
     for_each_field<T>([&](const auto& field) {
-        type.def_property_readonly(
-            field.name, [field](const T& object) { return to_python(field.of(object)); }, field.doc);
+        using F = std::remove_cvref_t<decltype(field)>;
+        using V = std::remove_cvref_t<decltype(F::of(std::declval<T&>()))>;
+        // A function pointer: the code that calls it is the same for all fields of one type
+        PythonType<V> (*const read)(const T&) = [](const T& object) { return to_python(F::of(object)); };
+        type.def_property_readonly(field.name, read, field.doc);
+        keys.push_back({field.name, field.stored, is_optional_part<V>});
     });
-    type.def(
-        "to_dict",
-        [](const T& object) {
-            py::dict values = dict_of(object);
-            for_each_field<T>([&](const auto& field) {
-                if (!field.stored || values[field.name].is_none()) {
-                    values.attr("pop")(field.name);
-                } else if constexpr (is_optional_part<std::remove_cvref_t<decltype(field.of(object))>>) {
-                    values[field.name] = values[field.name].attr("to_dict")();
-                }
-            });
-            return values;
-        },
-        "Returns the fields that are written to a file, by name. Optional fields without a value are left "
-        "out.");
-    type.def("__reduce__", [](const py::object& self) {
-        const py::object rebuild = py::module_::import("functools").attr("partial");
-        return py::make_tuple(rebuild(py::type::of(self), **dict_of(self.cast<const T&>())), py::tuple());
-    });
-    type.def("__eq__", [](const T& self, const py::object& other) -> py::object {
-        return py::isinstance<T>(other) ? py::bool_(dict_of(self).equal(dict_of(other.cast<const T&>())))
-                                        : py::reinterpret_borrow<py::object>(Py_NotImplemented);
-    });
-    type.def("__hash__", [](const T& self) {
-        py::list items;
-        for (const auto& [name, value] : dict_of(self)) {
-            items.append(py::isinstance<py::list>(value)
-                             ? py::object(py::tuple(py::reinterpret_borrow<py::list>(value)))
-                             : py::reinterpret_borrow<py::object>(value));
-        }
-        return py::hash(py::tuple(items));
-    });
-    if (with_repr) {
-        type.def("__repr__", [](const py::object& self) {
-            std::string text;
-            for (const auto& [name, value] : dict_of(self.cast<const T&>())) {
-                text += (text.empty() ? "" : ", ") + std::string(py::str(name)) + "=" +
-                        std::string(py::repr(value));
-            }
-            return py::type::of(self).attr("__name__").cast<std::string>() + "(" + text + ")";
-        });
-    }
+    bind_protocol(type, std::move(keys), with_repr);
 }
 
 }  // namespace palpate::bindings

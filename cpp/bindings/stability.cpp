@@ -11,9 +11,12 @@
 #include "bindings.hpp"
 #include "fields.hpp"
 #include "palpate/stability/account_certificate.hpp"
+#include "palpate/stability/admittance_inequalities.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
+#include "palpate/stability/tangent_inequalities.hpp"
 #include "settings.hpp"
 
 namespace palpate::bindings {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/json_field.hpp"
+#include "palpate/model/fingerprint.hpp"
 #include "palpate/stability/certificate_check.hpp"
 #include "support.hpp"
 

@@ -13,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/model/detail/limited_energy.hpp"
 #include "palpate/model/force_model.hpp"
 #include "support.hpp"
 

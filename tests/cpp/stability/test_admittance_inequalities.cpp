@@ -14,6 +14,7 @@
 #include "admittance/scenes.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
+#include "palpate/stability/explicit_inequalities.hpp"
 #include "support.hpp"
 
 namespace palpate::admittance_tests {

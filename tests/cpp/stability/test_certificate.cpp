@@ -15,6 +15,10 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
+#include "palpate/stability/coupling_need.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
+#include "palpate/stability/explicit_inequalities.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
 #include "slopes.hpp"
 #include "support.hpp"

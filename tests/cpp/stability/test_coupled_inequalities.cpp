@@ -18,6 +18,9 @@
 #include "palpate/rendering/massless.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
+#include "palpate/stability/coupling_need.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -13,6 +13,7 @@
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
 #include "support.hpp"
 

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/predicted_force.hpp"
 
 namespace palpate {

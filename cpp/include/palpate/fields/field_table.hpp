@@ -180,32 +180,35 @@ template <HasWords Enum>
 
 /// Throws std::invalid_argument unless `holds` is true. The message contains the name of the field, its value, and the
 /// text `right`, for example "> 0".
-inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
+inline void require_field(bool holds, std::string_view field, double value, std::string_view right) {
     if (!holds) {
-        throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
+        throw std::invalid_argument(std::string{field} + " is " + readable(value) + ", must be " +
+                                    std::string{right});
     }
 }
 
 template <HasFields S>
-void check_fields(const S& object, const std::string& prefix = "");
+void check_fields(const S& object, std::string_view prefix = "");
 
 /// Throws std::invalid_argument if a number does not satisfy the rule of its field or a text is not an allowed text of
 /// its field; checks each field of a struct. Accepts values of other types.
-template <class F, class V>
-void check_value(const F& field, const V& value, const std::string& prefix) {
+template <class V>
+void check_value(std::string_view prefix, const char* name, Rule rule,
+                 std::span<const std::string_view> words, const V& value) {
     if constexpr (is_optional<V>) {
         if (value) {
-            check_value(field, *value, prefix);
+            check_value(prefix, name, rule, words, *value);
         }
     } else if constexpr (HasFields<V>) {
-        check_fields(value, prefix + field.name + ".");
+        check_fields(value, std::string{prefix} + name + ".");
     } else if constexpr (std::is_arithmetic_v<V>) {
         const auto number = static_cast<double>(value);
-        require_field(satisfies(number, field.rule), prefix + field.name, number, text(field.rule));
+        if (!satisfies(number, rule)) {
+            require_field(false, std::string{prefix} + name, number, text(rule));
+        }
     } else if constexpr (std::is_same_v<V, std::string>) {
-        const auto& words = field.words;
         if (!words.empty() && std::find(words.begin(), words.end(), value) == words.end()) {
-            throw std::invalid_argument(prefix + field.name + " is '" + value + "', must be " +
+            throw std::invalid_argument(std::string{prefix} + name + " is '" + value + "', must be " +
                                         either(words));
         }
     }
@@ -214,8 +217,10 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
 /// Checks the numbers and texts in all fields of one object. If a value is not allowed, throws std::invalid_argument
 /// with the name of the field, its value and the rule. In the message `prefix` precedes the name.
 template <HasFields S>
-void check_fields(const S& object, const std::string& prefix) {
-    for_each_field<S>([&](const auto& field) { check_value(field, field.of(object), prefix); });
+void check_fields(const S& object, std::string_view prefix) {
+    for_each_field<S>([&](const auto& field) {
+        check_value(prefix, field.name, field.rule, field.words, field.of(object));
+    });
 }
 
 }  // namespace palpate

@@ -26,16 +26,16 @@ class JsonField {
 
     /// Throws std::invalid_argument with the path of this value, the value and `right`, the description of valid
     /// values.
-    [[noreturn]] void refuse(const std::string& right) const {
+    [[noreturn]] void refuse(std::string_view right) const {
         std::string shown = value_.is_number_float() && !std::isfinite(value_.get<double>())
                                 ? readable(value_.get<double>())  // not valid JSON
                                 : value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
         throw std::invalid_argument((path_.empty() ? "the content is " : path_ + " is ") + shown +
-                                    ": must be " + right);
+                                    ": must be " + std::string{right});
     }
     /// Throws std::invalid_argument if `holds` is false; `right` describes valid values in the error message.
-    void require(bool holds, const std::string& right) const {
+    void require(bool holds, std::string_view right) const {
         if (!holds) {
             refuse(right);
         }
@@ -60,10 +60,10 @@ class JsonField {
     [[nodiscard]] bool is_null() const { return value_.is_null(); }
 
     /// Returns the value of a key of this object. Throws if the key is missing.
-    [[nodiscard]] JsonField operator[](const std::string& key) const {
+    [[nodiscard]] JsonField operator[](std::string_view key) const {
         const std::string path = (path_.empty() ? "" : path_ + ".") + readable_key(key);
         require(value_.is_object(), "an object");
-        const auto found = value_.find(key);
+        const auto found = value_.find(std::string{key});
         if (found == value_.end()) {
             throw std::invalid_argument(path + " is missing");
         }
@@ -166,19 +166,15 @@ class JsonField {
     template <class T>
     [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {
         if constexpr (HasFields<T>) {
-            std::vector<std::string_view> names;
-            for_each_field<T>([&](const auto& field) {
-                if (field.stored) {
-                    names.emplace_back(field.name);
-                }
+            auto names = fields_of<T>.apply([](const auto&... field) {
+                return std::vector<std::string_view>{(field.stored ? field.name : "")...};
             });
+            std::erase(names, "");
             require_keys(names);
             T read;
             for_each_field<T>([&](const auto& field) {
-                auto& value = field.of(read);
-                using V = std::remove_cvref_t<decltype(value)>;
-                if (field.stored && !(is_optional<V> && !value_.contains(field.name))) {
-                    value = (*this)[field.name].template as<V>(field.rule, field.words);
+                if (field.stored) {
+                    read_key(field.name, field.of(read), field.rule, field.words);
                 }
             });
             return read;
@@ -196,9 +192,17 @@ class JsonField {
     }
 
   private:
+    /// Reads the value of a key; leaves `read` as it is if it may be missing, and is.
+    template <class T>
+    void read_key(std::string_view key, T& read, Rule rule, std::span<const std::string_view> words) const {
+        if (!is_optional<T> || value_.contains(std::string{key})) {
+            read = (*this)[key].template as<T>(rule, words);
+        }
+    }
+
     /// Returns a key without control characters, for a message.
-    [[nodiscard]] static std::string readable_key(const std::string& key) {
-        const std::string quoted = Json(key).dump();
+    [[nodiscard]] static std::string readable_key(std::string_view key) {
+        const std::string quoted = Json(std::string{key}).dump();
         return quoted.substr(1, quoted.size() - 2);
     }
 

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <limits>
 
+#include "palpate/inline.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/model/network_curve.hpp"
 
 namespace palpate {
 
@@ -23,180 +20,19 @@ struct EnergyRange {
     [[nodiscard]] double span() const noexcept { return largest - least + missed; }
 };
 
-namespace detail {
-
-/// Returns the energy that a force limit removes between two positions [J]: the integral of f - c(f), where c(f) is the
-/// force f limited to +-`limit`. `at(x)` returns force and antiderivative at x. The interval is halved until |f| is at
-/// most `limit` at both ends, or exceeds `limit` with the same sign at both ends, but at most `halvings` times.
-template <class At>
-[[nodiscard]] double work_beyond(const At& at, double from, const Curve& at_from, double to,
-                                 const Curve& at_to, double limit, int halvings = 40) noexcept {
-    const auto side = [&](double force) noexcept { return force > limit ? 1 : force < -limit ? -1 : 0; };
-    const int first = side(at_from.value);
-    if (first == side(at_to.value) || halvings == 0) {
-        return first == 0 ? 0.0 : at_to.integral - at_from.integral - first * limit * (to - from);
-    }
-    const double middle = 0.5 * (from + to);
-    const Curve at_middle = at(middle);
-    return work_beyond(at, from, at_from, middle, at_middle, limit, halvings - 1) +
-           work_beyond(at, middle, at_middle, to, at_to, limit, halvings - 1);
-}
-
-/// Finds by bisection the position between `below` and `above` at which the force f changes from negative to positive:
-/// the position of smallest energy.
-template <class At>
-[[nodiscard]] double rest_between(const At& at, double below, double above) noexcept {
-    constexpr int halvings = 60;
-    for (int k = 0; k < halvings; ++k) {
-        const double middle = 0.5 * (below + above);
-        (at(middle).value < 0.0 ? below : above) = middle;
-    }
-    return below;
-}
-
-/// Returns the decrease of the stored energy of the limited force outside an edge of the domain [J]. It is the work of
-/// a force that pushes the tool out of the domain, up to the position at which the straight line of the force reaches
-/// zero.
-[[nodiscard]] inline double decrease_beyond(const EdgeLine& line, double outward, double limit) noexcept {
-    const double force = std::abs(line.at_edge.value);
-    if (!(-outward * line.at_edge.value > 0.0)) {
-        return 0.0;
-    }
-    const double within = std::min(force, limit);
-    return (force - 0.5 * within) * within / std::abs(line.at_edge.slope);
-}
-
-/// Smallest and largest stored energy of a force with a force limit over a domain, and the stored energy at both ends
-/// of the domain [J].
-struct LimitedEnergy {
-    EnergyRange range;
-    double at_lower = 0.0;
-    double at_upper = 0.0;
-};
-
-/// Computes the stored energy of a limited force over a domain: the energy of the force f minus the energy that the
-/// force limit removes. f is sampled at the borders of cells of width w; L is the largest |f'|. Let |f| be below the
-/// force limit at both ends of a cell, or above it with the same sign. Then f can cross the force limit between the
-/// samples only if f at one end differs from it by at most L w / 2. Such a crossing changes the energy by at most L w^2
-/// / 4. Between the ends of a cell and the position of zero force, the energy lies outside its sampled values by less
-/// than L w^2 / 4.
-template <class At>
-[[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
-                                           double steepest, double limit) noexcept {
-    const double width = (upper - lower) / static_cast<double>(cells);
-    const double missed_between_samples = 0.25 * steepest * width * width;
-    double from = lower;
-    Curve at_from = at(lower);
-    LimitedEnergy energy{
-        {at_from.integral, at_from.integral, missed_between_samples}, at_from.integral, at_from.integral};
-    double beyond = 0.0;
-    for (std::size_t k = 1; k <= cells; ++k) {
-        const double to = lower + (upper - lower) * static_cast<double>(k) / static_cast<double>(cells);
-        const Curve at_to = at(to);
-        if (at_from.value < 0.0 && at_to.value >= 0.0) {
-            const double rest = rest_between(at, from, to);
-            const Curve at_rest = at(rest);
-            const double energy_at_rest =
-                at_rest.integral - beyond - work_beyond(at, from, at_from, rest, at_rest, limit);
-            energy.range.least = std::min(energy.range.least, energy_at_rest);
-        }
-        const auto is_near = [&](const Curve& end) noexcept {
-            return std::abs(std::abs(end.value) - limit) <= 0.5 * steepest * width;
-        };
-        energy.range.missed += is_near(at_from) || is_near(at_to) ? missed_between_samples : 0.0;
-        beyond += work_beyond(at, from, at_from, to, at_to, limit);
-        energy.at_upper = at_to.integral - beyond;
-        energy.range.least = std::min(energy.range.least, energy.at_upper);
-        energy.range.largest = std::max(energy.range.largest, energy.at_upper);
-        from = to;
-        at_from = at_to;
-    }
-    return energy;
-}
-
-/// Returns the number of cells into which the domain is divided to compute the energy of a model: 1024, plus 16 for
-/// each width of the finest wavelet that fits in the domain; at most 10^6.
-[[nodiscard]] inline std::size_t energy_cells(double travel, double finest_width) noexcept {
-    constexpr double fewest = 1024.0;
-    constexpr double most = 1e6;
-    return static_cast<std::size_t>(std::min(most, fewest + 16.0 * travel / finest_width));
-}
-
-}  // namespace detail
-
 /// Returns the smallest and largest stored energy of a force of position and velocity, at velocity zero and with a
 /// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative. For slopes up to
 /// L, the error of the rule is at most 5/36 L w^2 in a cell of width w. Its three values represent the positions at most
 /// w/6, w/3 and w/6 away from them.
-[[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
-    const auto at = [&](double x) noexcept {
-        return Curve{.value = std::clamp(force.force(x, 0.0), -force_limit, force_limit)};
-    };
-    const auto work = [&](double from, double at_from, double to, double at_to) noexcept {
-        return (to - from) / 6.0 * (at_from + 4.0 * at(0.5 * (from + to)).value + at_to);
-    };
-    const std::size_t cells = detail::energy_cells(force.travel(), force.finest_width());
-    double energy = 0.0;
-    double from = force.lower();
-    double at_from = at(from).value;
-    EnergyRange range;
-    for (std::size_t k = 1; k <= cells; ++k) {
-        const double to =
-            force.lower() + force.travel() * static_cast<double>(k) / static_cast<double>(cells);
-        const double at_to = at(to).value;
-        if (at_from < 0.0 && at_to >= 0.0) {
-            const double rest = detail::rest_between(at, from, to);
-            range.least = std::min(range.least, energy + work(from, at_from, rest, 0.0));
-        }
-        energy += work(from, at_from, to, at_to);
-        range.least = std::min(range.least, energy);
-        range.largest = std::max(range.largest, energy);
-        from = to;
-        at_from = at_to;
-    }
-    const double steepest = force.resting_bounds(0.01).gradient[0].largest();
-    const double width = force.travel() / static_cast<double>(cells);
-    // As in `limited_energy`, the energy between two samples lies outside the sampled values by at most L w^2 / 4.
-    range.missed = (5.0 / 36.0 * static_cast<double>(cells) + 0.25) * steepest * width * width;
-    range.least = std::min({range.least, -detail::decrease_beyond(force.below(), -1.0, force_limit),
-                            energy - detail::decrease_beyond(force.above(), +1.0, force_limit)});
-    return range;
-}
+[[nodiscard]] PALPATE_INLINE EnergyRange energy_range(const VelocityNetwork& force, double force_limit);
 
 /// Returns the smallest and largest stored energy of a model of position, or of position and velocity, whose force is
 /// limited to +-`force_limit` [N].
-[[nodiscard]] inline EnergyRange energy_range(const ForceModel& model,
-                                              double force_limit = std::numeric_limits<double>::infinity()) {
-    require_renderable(model);
-    if (const VelocityNetwork* of_velocity = model.velocity()) {
-        return energy_range(*of_velocity, force_limit);
-    }
-    const HysteresisNetwork* pair = model.hysteresis();
-    const NetworkCurve& force = pair != nullptr ? pair->force() : model.network()->curve();
-    const std::size_t cells = detail::energy_cells(force.upper() - force.lower(), model.finest_width());
-    const detail::LimitedEnergy energy =
-        detail::limited_energy([&](double x) noexcept { return force.inside(x); }, force.lower(),
-                               force.upper(), cells, force.slope_bounds().largest(), force_limit);
-    EnergyRange range = energy.range;
-    if (pair != nullptr) {
-        // With hysteresis the object stores more by at most r max h / 2: the work of the hysteresis force s h while the
-        // direction state s grows from 0 to 1 over the play radius r.
-        range.largest +=
-            0.5 * pair->play_radius() * std::max(0.0, pair->hysteresis_force().value_bounds().upper);
-    }
-    if (const MemoryNetwork* memory = model.memory()) {
-        range.largest += memory->largest_energy();
-    }
-    if (force.periodic()) {
-        if (std::abs(energy.at_upper - energy.at_lower) > 1e-9 * (range.largest - range.least)) {
-            range.least = -std::numeric_limits<double>::infinity();
-        }
-        return range;
-    }
-    range.least =
-        std::min({range.least, energy.at_lower - detail::decrease_beyond(force.below(), -1.0, force_limit),
-                  energy.at_upper - detail::decrease_beyond(force.above(), +1.0, force_limit)});
-    return range;
-}
+[[nodiscard]] PALPATE_INLINE EnergyRange
+energy_range(const ForceModel& model, double force_limit = std::numeric_limits<double>::infinity());
 
 }  // namespace palpate
+
+#ifndef PALPATE_COMPILED
+#include "palpate/model/detail/energy.hpp"
+#endif

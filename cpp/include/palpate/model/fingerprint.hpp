@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
+#include "palpate/fields/field_table.hpp"
 #include "palpate/model/force_model.hpp"
 
 namespace palpate {
@@ -50,6 +52,36 @@ class NumberHash {
   private:
     std::uint64_t value_ = 0xCBF29CE484222325U;
 };
+
+/// Adds a value to a hash: each stored field of a struct, each item of a list.
+template <class T>
+void hash_value(NumberHash& hash, const T& value) {
+    if constexpr (HasFields<T>) {
+        for_each_field<T>([&](const auto& field) {
+            const auto& part = field.of(value);
+            if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
+                // An empty optional field does not change the hash, so fingerprints computed before this field existed
+                // remain valid
+                if (part) {
+                    hash.add(std::string_view{field.name});
+                    hash_value(hash, *part);
+                }
+            } else if (field.stored) {
+                hash_value(hash, part);
+            }
+        });
+    } else if constexpr (std::is_enum_v<T>) {
+        hash.add(static_cast<std::uint64_t>(value));
+    } else if constexpr (std::is_arithmetic_v<T>) {
+        hash.add(static_cast<double>(value));
+    } else if constexpr (std::is_same_v<T, std::string>) {
+        hash.add(std::string_view{value});
+    } else {
+        for (const auto& item : value) {
+            hash_value(hash, item);
+        }
+    }
+}
 
 }  // namespace detail
 

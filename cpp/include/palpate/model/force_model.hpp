@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
-#include <utility>
 #include <variant>
 
-#include "palpate/fields/readable.hpp"
+#include "palpate/inline.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/memory.hpp"
 #include "palpate/model/network.hpp"
@@ -38,17 +35,17 @@ class ForceModel {
   public:
     using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork, VelocityNetwork>;
 
-    ForceModel(NetworkParameters network, Domain domain)
-        : kind_{make_network(std::move(network), std::move(domain))} {}
-
+    ForceModel(NetworkParameters network, Domain domain);
     ForceModel(const NetworkParameters& network, const HysteresisParameters& hysteresis, const Domain& domain,
-               std::optional<double> play_radius)
-        : kind_{make_hysteresis(network, hysteresis, domain, play_radius)}, play_radius_{play_radius} {}
+               std::optional<double> play_radius);
+    ForceModel(const ForceModel&);
+    ForceModel(ForceModel&&) noexcept;
+    ForceModel& operator=(const ForceModel&);
+    ForceModel& operator=(ForceModel&&) noexcept;
+    ~ForceModel();
 
     /// Makes a force of position and velocity: the second input of the network is the velocity.
-    [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain) {
-        return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
-    }
+    [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain);
 
     /// Returns the force law: a network of position, a network with hysteresis, a network of position and velocity, or
     /// a network of several inputs.
@@ -94,39 +91,12 @@ class ForceModel {
     /// and at rest. With a play radius r and h >= 0, the bounds also hold during the motion after a reversal that changes
     /// press force to release force, which adds h / r (hysteresis / play radius) to the slope. Throws
     /// std::invalid_argument for models that cannot be rendered (`require_renderable`).
-    [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
-        if (const WaveletNetwork* single = network()) {
-            return single->curve().slope_bounds();
-        }
-        if (velocity() != nullptr) {
-            return velocity()->resting_bounds(0.01).gradient[0];
-        }
-        require_one_input(parameters());
-        const Interval common = hysteresis()->force().slope_bounds();
-        const double hysteresis_slope = hysteresis()->hysteresis_force().slope_bounds().largest();
-        const double sticking_slope =
-            radius ? hysteresis()->hysteresis_force().value_bounds().largest() / *radius : 0.0;
-        return {common.lower - hysteresis_slope, common.upper + hysteresis_slope + sticking_slope};
-    }
+    [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const;
 
     /// Throws std::invalid_argument if the slope bounds stored in a model file do not contain the slopes of this
     /// network of one input; accepts networks of several inputs. A difference of 1 % of the steepest slope is accepted,
     /// because two releases of the program may compute bounds that differ by this amount.
-    void require_slopes_within(Interval stored) const {
-        if (parameters().dimension != 1) {
-            return;
-        }
-        const Interval slopes = slope_bounds();
-        const double slack = 0.01 * slopes.largest();
-        const auto sentence = [](const char* name, double value, const char* side, double bound) {
-            return std::string("slope_bounds.") + name + " is " + readable(value) + ": must be " + side +
-                   " " + readable(bound) + ", the bound of this network's slope";
-        };
-        detail::require(stored.lower <= slopes.lower + slack,
-                        sentence("min", stored.lower, "at most", slopes.lower));
-        detail::require(stored.upper >= slopes.upper - slack,
-                        sentence("max", stored.upper, "at least", slopes.upper));
-    }
+    void require_slopes_within(Interval stored) const;
 
     /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
@@ -135,51 +105,16 @@ class ForceModel {
     }
 
     /// Returns a copy of a force of position without hysteresis, with this memory. The force becomes the force at rest.
-    [[nodiscard]] ForceModel with_memory(MemoryParameters parameters) const {
-        detail::require(network() != nullptr,
-                        "only a force of position without hysteresis can have a memory");
-        ForceModel model = *this;
-        model.memory_.emplace(std::move(parameters), network()->curve(), domain());
-        return model;
-    }
+    [[nodiscard]] ForceModel with_memory(MemoryParameters parameters) const;
 
     /// Returns a copy of the model with this play radius [m]. A model without hysteresis is copied unchanged.
-    [[nodiscard]] ForceModel with_play_radius(double radius) const {
-        const HysteresisNetwork* both = hysteresis();
-        if (both == nullptr) {
-            return *this;
-        }
-        const NetworkParameters& h = both->hysteresis_force().parameters();
-        return ForceModel{both->parameters(), {h.weight, h.linear[0], h.bias}, both->domain(), radius}
-            .with_units(units_);
-    }
+    [[nodiscard]] ForceModel with_play_radius(double radius) const;
 
     /// Returns a copy of the model whose numbers are given in these units. The numbers do not change.
-    [[nodiscard]] ForceModel with_units(ModelUnits units) const {
-        ForceModel model = *this;
-        model.units_ = std::move(units);
-        return model;
-    }
+    [[nodiscard]] ForceModel with_units(ModelUnits units) const;
 
   private:
-    explicit ForceModel(Kind kind) : kind_{std::move(kind)} {}
-
-    static Kind make_network(NetworkParameters network, Domain domain) {
-        if (network.dimension == 1) {
-            return WaveletNetwork{network, std::move(domain)};
-        }
-        return RadialNetwork{std::move(network), std::move(domain)};
-    }
-
-    static HysteresisNetwork make_hysteresis(const NetworkParameters& network,
-                                             const HysteresisParameters& hysteresis, const Domain& domain,
-                                             std::optional<double> play_radius) {
-        detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
-                        "a hysteresis network has one input");
-        const double radius =
-            play_radius.value_or(usual_play_radius(std::abs(domain.upper[0] - domain.lower[0])));
-        return {network, hysteresis, domain, radius};
-    }
+    explicit ForceModel(Kind kind);
 
     Kind kind_;
     std::optional<double> play_radius_;
@@ -196,3 +131,7 @@ inline void require_renderable(const ForceModel& model) {
 }
 
 }  // namespace palpate
+
+#ifndef PALPATE_COMPILED
+#include "palpate/model/detail/force_model.hpp"
+#endif

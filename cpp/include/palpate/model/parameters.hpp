@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "palpate/inline.hpp"
@@ -45,9 +46,9 @@ struct Domain {
 namespace detail {
 
 /// Throws std::invalid_argument with the message `sentence` unless `holds` is true.
-inline void require(bool holds, const std::string& sentence) {
+inline void require(bool holds, std::string_view sentence) {
     if (!holds) {
-        throw std::invalid_argument(sentence);
+        throw std::invalid_argument(std::string{sentence});
     }
 }
 

@@ -107,8 +107,8 @@ struct RenderJob {
 };
 
 /// Throws std::invalid_argument with the given sentence.
-[[noreturn]] inline void refuse(const std::string& sentence) {
-    throw std::invalid_argument(sentence);
+[[noreturn]] inline void refuse(std::string_view sentence) {
+    throw std::invalid_argument(std::string{sentence});
 }
 
 /// Returns true if the options change the rendering that the plan describes. The certificate does not hold in this

@@ -26,8 +26,9 @@ PALPATE_INLINE void validate(const Scheme& scheme, const ForceModel& model) {
         check_fields(scheme.coupling, "coupling_");
     }
     if (traits.mass) {
-        check_value(fields_of<Scheme>.get<3>(), scheme.inertia.mass, "");
-        check_value(fields_of<Scheme>.get<4>(), scheme.inertia.damping, "");
+        require_field(satisfies(scheme.inertia.mass, Rule::Positive), "mass", scheme.inertia.mass, "> 0");
+        require_field(satisfies(scheme.inertia.damping, Rule::NotNegative), "object_damping",
+                      scheme.inertia.damping, ">= 0");
     }
     const std::string predict = "predict is " + std::to_string(scheme.predict);
     detail::require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps,
