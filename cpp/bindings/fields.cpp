@@ -31,7 +31,7 @@ py::dict dict_of(const py::object& object, const std::vector<FieldKey>& keys) {
 
 }  // namespace
 
-void bind_protocol(py::object type, std::vector<FieldKey> keys, bool with_repr) {
+void bind_protocol(const py::object& type, const std::vector<FieldKey>& keys, bool with_repr) {
     define(
         type, "to_dict",
         [keys](const py::object& self) {

@@ -67,7 +67,7 @@ struct FieldKey {
 };
 
 /// Adds to_dict, pickling, copying, comparison, hash and, if `with_repr` is true, repr to a Python class.
-void bind_protocol(pybind11::object type, std::vector<FieldKey> keys, bool with_repr);
+void bind_protocol(const pybind11::object& type, const std::vector<FieldKey>& keys, bool with_repr);
 
 /// Makes a C++ struct a Python class, from the table of the struct's fields: keyword arguments, attributes, `to_dict`,
 /// pickling, copying, comparison, hash and repr. `with_repr` is false for a class that defines its repr separately;
@@ -98,7 +98,7 @@ void bind_fields(
         type.def_property_readonly(field.name, read, field.doc);
         keys.push_back({field.name, field.stored, is_optional_part<V>});
     });
-    bind_protocol(type, std::move(keys), with_repr);
+    bind_protocol(type, keys, with_repr);
 }
 
 }  // namespace palpate::bindings
