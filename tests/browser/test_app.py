@@ -97,7 +97,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Writes a simulated recording and returns its file."""
     file = tmp_path_factory.mktemp("recordings") / "knob.csv"
-    sample_recording(seed=1, duration_s=0.5).write(file)
+    sample_recording(seed=1, duration_s=1.5).write(file)
     return file
 
 

@@ -25,8 +25,8 @@ def between_steps(time: Float1D) -> tuple[Float1D, float]:
     lines are split until this holds (Douglas & Peucker 1973). The rows before a pause of the recorder do not
     reach into it.
     """
-    steps = np.diff(time)
-    begins = np.r_[0, np.flatnonzero(steps > 0.0) + 1]
+    steps = np.diff(time, prepend=-np.inf)
+    begins = np.flatnonzero(steps > 0.0)
     clock, ends = time[begins], np.append(begins[1:], len(time)) - 1
     if np.count_nonzero(ends > begins) < MIN_REPEATED or not (steps >= 0.0).all():
         return time, 0.0

@@ -36,7 +36,7 @@ def test_a_pause_of_the_recorder_stays_a_pause() -> None:
 
 
 @pytest.mark.parametrize(
-    "clock", [[0.0, 1.0, 2.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, np.nan, 1.0, 2.0]]
+    "clock", [[], [0.0, 1.0, 2.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 1.0, 2.0], [0.0, 0.0, np.nan, 1.0, 2.0]]
 )
 def test_other_times_are_kept(clock: list[float]) -> None:
     time, step = between_steps(np.array(clock))

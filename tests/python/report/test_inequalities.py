@@ -21,9 +21,8 @@ def words_in(file: str, of: str) -> set[str]:
 
 
 def test_every_inequality_of_the_core_has_a_meaning_and_a_unit() -> None:
-    text = "".join(file.read_text(encoding="utf-8") for file in STABILITY.glob("*_inequalities.hpp"))
-    for name in ("certificate.hpp", "account_certificate.hpp"):
-        text += (STABILITY / name).read_text(encoding="utf-8")
+    files = (*STABILITY.glob("*_inequalities.hpp"), *STABILITY.rglob("*certificate.hpp"))
+    text = "".join(file.read_text(encoding="utf-8") for file in files)
     ids = set(re.findall(r'"([a-z]+(?:-[a-z]+)+)"', text)) - words_in("certificate.hpp", "Verdict")
     assert ids == set(MEANINGS)
     assert all(_unit(kind, "rad") for kind, _ in MEANINGS.values() if kind)
