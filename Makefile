@@ -149,6 +149,7 @@ test-full: setup control examples $(stamps)/simulators
 	    $(call part,tools/cpp_tests.sh $$preset) && $(call part,tools/python_sanitized.sh $$preset) || exit; done
 	$(call part,$(MAKE) --no-print-directory fuzz)
 	$(call part,$(MAKE) --no-print-directory test-packages)
+	$(system_packages) guest
 	$(call part,$(python) -m pytest tests/usb tests/simulators)
 	$(call part,PALPATE_BENCH_SCALE=0.01 tools/bench.sh)
 	$(system_packages) windows
