@@ -273,19 +273,24 @@ def waits(position: Float1D, time: Float1D | None = None) -> NDArray[np.bool_] |
     nearby = np.fmax(typical[: len(ticks)], typical[-len(ticks) :])
     nearby = np.maximum(np.nan_to_num(nearby, nan=1.0), np.finfo(float).tiny)
     speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(ticks) - 1)]
+    row = np.arange(len(x))
+    before = np.maximum(row - 1, 0)
+
+    def is_slow(first: NDArray[np.intp], last: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray(
+            travelled[last] - travelled[first] < SLOW_RATIO * speed * (tick[last] - tick[first])
+        )
+
     # Speed is taken back to the last row that is far enough, at least to the row before.
     first = np.searchsorted(tick, tick - 2.0 * band / speed, side="right") - 1
-    first = np.maximum(np.minimum(first, np.arange(len(x)) - 1), 0)
-    slow = travelled - travelled[first] < SLOW_RATIO * speed * (tick - tick[first])
+    slow = is_slow(np.maximum(np.minimum(first, row - 1), 0), row)
     slow[0] = slow[1]
     # A tool that trembles within the noise while it waits is slow over a longer way.
-    row, lasting = np.arange(len(x)), band / SLOW_RATIO / speed
-    before = np.maximum(row - 1, 0)
-    first = np.searchsorted(tick, tick - lasting)
-    last = np.searchsorted(tick, tick[before] + lasting, side="right") - 1
-    waiting = slow.copy()
-    for begin, end in ((first, row), (before, np.maximum(last, row))):
-        waiting |= travelled[end] - travelled[begin] < SLOW_RATIO * speed * (tick[end] - tick[begin])
+    longer = band / SLOW_RATIO / speed
+    last = np.searchsorted(tick, tick[before] + longer, side="right") - 1
+    waiting = (
+        slow | is_slow(np.searchsorted(tick, tick - longer), row) | is_slow(before, np.maximum(last, row))
+    )
     found = np.zeros(len(x), dtype=bool)
     for begin, end in np.flatnonzero(np.diff(waiting, prepend=False, append=False)).reshape(-1, 2).tolist():
         rows = begin + np.flatnonzero(slow[begin:end])

@@ -177,8 +177,10 @@ def place_findings(best: Judged) -> list[Finding]:
     if noticed[worst] <= MOST_JND:
         return []
     stroke = "" if best.side is None else (" of the release" if worst >= places else " of the press")
-    middle = data.path.min() + np.ptp(data.path) * (worst % places + 0.5) / places
-    box, unit = middle if data.period is None else modulo(middle), data.force_unit
+    middle, unit = (worst % places + 0.5) / places, data.force_unit
+    if data.period is not None:
+        middle = float(data.path.min() + np.ptp(data.path) * middle)
+    box = middle if data.period is None else float(modulo(np.array([middle]))[0])
     more = _more_inputs(bool(data.parts), data.side is not None)
     reason = (
         f"the force there depends on more than {best.inputs}, such as earlier motion{best.pinched}: {more}"
