@@ -242,6 +242,7 @@ RULES = (
     Rule("rows that wait are not fitted", "recording.conversion", "waits", _no_waits),
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
     Rule("positions of a fit are in whole steps", f"{DATA}.rows", "stepped", _first),
+    Rule("hum is subtracted", "recording.roles", "without_hum", lambda recording: (recording, [])),
     Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule("period is fitted", f"{DATA}.period", "_fitted", lambda x, f, way, period, orders, cells: period),
@@ -300,6 +301,8 @@ RULES = (
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
     Rule("force near the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 1e9),
     Rule("force may exceed the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 0.0),
+    constant("recording.roles.without_hum", "HUM_RATIO", 64.0, "recording.hum"),
+    constant("recording.roles.without_hum", "MAINS_TOLERANCE", 0.0, "recording.hum"),
     constant("recording.roles.wrong_readings", "WRONG_RATIO", 16.0, f"{CHECKS}.wrong_readings"),
     constant("recording.roles.wrong_readings", "LEAST_WRONG", 0.0, f"{CHECKS}.wrong_readings"),
     constant("recording.roles.roles_of", "AIR_MARGIN", 1.0),
@@ -440,6 +443,15 @@ def of_changes(draw: int) -> Fit:
     return Fit([recording], error, {})
 
 
+def of_hum(draw: int) -> Fit:
+    """Returns a draw of the bench of ordinary recordings with the hum of the mains in its force."""
+    _, rows = drawn(draw)
+    random = np.random.default_rng([43, draw])
+    height, omega = random.uniform(0.002, 0.04) * np.ptp(rows.force), 2.0 * np.pi * random.normal(50.0, 0.1)
+    hum = height * np.sin(omega * rows.motion.time + random.uniform(0.0, 2.0 * np.pi))
+    return Fit([replace(rows, force_error=rows.force_error + hum).recording()], Truth.of(rows).error, {})
+
+
 def of_slots(draw: int, turns: int = 1) -> Fit:
     """Returns the torque of a motor with seven poles and twelve slots over some turns, identified with the
     period of one pole for one turn, else with the period that is found."""
@@ -536,6 +548,7 @@ def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
         found.append((f"kinks without noise, draw {draw}", of_kinks, draw))
         found.append((f"preload, draw {draw}", of_preload, draw))
         found.append((f"stored by change, draw {draw}", of_changes, draw))
+        found.append((f"hum, draw {seed + draw}", of_hum, seed + draw))
         found.append((f"poles and slots over three turns, draw {draw}", of_slots, draw, 3))
     found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:

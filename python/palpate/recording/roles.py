@@ -20,6 +20,7 @@ from .._typing import Float1D, Int8Vector
 from ..verdict import FORCE_FLOOR
 from .checks.wrong_readings import repeated_rows, wrong_readings
 from .contact import contact_at
+from .hum import without_hum
 from .rows import of_each
 
 if TYPE_CHECKING:
@@ -106,7 +107,8 @@ def counts_text(counts: Mapping[str, int]) -> str:
 
 
 class Informative:
-    """Recordings without rows that say nothing on the force of their object, and which rows these are.
+    """Recordings without hum and without rows that say nothing on the force of their object, and which rows
+    these are.
 
     Parameters
     ----------
@@ -118,8 +120,11 @@ class Informative:
     """
 
     def __init__(self, recordings: Sequence[Recording], lower: float | None = None) -> None:
-        self.recordings = list(recordings)
-        self._given = tuple(recordings)
+        quiet = [without_hum(each) for each in recordings]
+        self.given = [recording for recording, _ in quiet]
+        """Recordings (as many as given) with all rows, without hum"""
+        self._hum = [notes for _, notes in quiet]
+        self.recordings = list(self.given)
         self.kept = [np.arange(len(each)) for each in recordings]
         """Rows of each given recording that are left"""
         self._dropped: dict[tuple[int, str], NDArray[np.intp]] = {}
@@ -153,11 +158,12 @@ class Informative:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on dropped rows."""
-        found = []
+        """Sentences on hum and on dropped rows."""
+        several = len(self.given) > 1
+        names = [f"recording {number}: " if several else "" for number in range(1, len(self.given) + 1)]
+        found = [name + note for name, notes in zip(names, self._hum, strict=True) for note in notes]
         for (number, reason), rows in self._dropped.items():
-            where = f"recording {number + 1}: " if len(self._given) > 1 else ""
-            text = f"{where}{len(rows)} of {len(self._given[number])} rows dropped ({DROPPED[reason]})"
+            text = f"{names[number]}{len(rows)} of {len(self.given[number])} rows dropped ({DROPPED[reason]})"
             if reason == WRONG_READING:
                 named = [self._reading(number, row) for row in np.sort(rows)[:MOST_NAMED_ROWS].tolist()]
                 text += f": {', '.join(named)}{', and others' * (len(rows) > MOST_NAMED_ROWS)}"
@@ -190,7 +196,7 @@ class Informative:
 
     def _reading(self, number: int, row: int) -> str:
         """Returns the force and the position of a row of a given recording as text."""
-        given = self._given[number]
+        given = self.given[number]
         force, position = given.file_unit("force"), given.file_unit("position")
         return f"row {row}: {force.text(given.force[row])} at {position.text(given.position[row])}"
 

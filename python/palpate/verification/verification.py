@@ -251,6 +251,7 @@ def verify(
     require_in_range("position", recording.position)
     require_in_range("force", recording.force)
     informative, prediction, weight = _compared(model, recording, play_radius)
+    (recording,) = informative.given
     rows, dropped = prediction.rows, tuple(informative.notes)
     informative.drop_approach()
     reference = recording.force[rows]

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hum of the mains in the force: lines at multiples of 50 and 60 Hz, which are noise and not the object.
+
+A hum is a function of time, but one press and release show it as a ripple over position. Its frequency
+distinguishes it from the object.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._typing import Float1D
+
+if TYPE_CHECKING:
+    from .recording import Recording
+
+MAINS_HZ = 50.0, 60.0
+"""Frequencies of mains [Hz]."""
+
+MAINS_TOLERANCE = 0.004
+"""Deviation of the frequency of mains and of the clock of a recorder together [share of the frequency]."""
+
+HUM_RATIO = 4.0
+"""Power of a line above which it is a hum [largest power of the frequencies nearby, which the object and the
+noise have]."""
+
+MOST_OF_RATE = 0.4
+"""Highest frequency of a hum that is searched [share of the rate of the rows]."""
+
+
+def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
+    """Returns a recording with the hum subtracted from its force, and a note on each line of it.
+
+    The second difference of the force over time is compared, in which the motion has as much power at low
+    frequencies as at high ones; a Hann window keeps each line apart from the others. A line must be higher
+    than all others within a quarter of the frequency of the mains: the lines of an object that is pressed
+    periodically are as high as their neighbours. Recordings without time, or with more pauses than rows, are
+    returned as they are.
+    """
+    rows, step = recording.time, recording.sample_period
+    if rows is None or step is None or not np.ptp(rows) < 2.0 * step * len(rows):
+        return recording, []
+    time = np.arange(rows[0], rows[-1], step)
+    if len(time) < 3:
+        return recording, []
+    taper = np.hanning(len(time))[1:-1]
+
+    def bent(values: Float1D) -> Float1D:
+        return taper * np.diff(np.interp(time, rows, values), 2)
+
+    power = np.abs(np.fft.rfft(bent(recording.force))) ** 2
+    frequency = np.fft.rfftfreq(len(taper), step)
+    force, notes = recording.force, []
+    for hertz in sorted(
+        {each for mains in MAINS_HZ for each in np.arange(mains, MOST_OF_RATE / step, mains)}
+    ):
+        distance, width = np.abs(frequency - hertz), 2.0 * frequency[1]
+        nearby = power[(distance > MAINS_TOLERANCE * hertz + width) & (distance < MAINS_HZ[0] / 4.0)]
+        lines = np.flatnonzero(distance <= MAINS_TOLERANCE * hertz + width / 2.0)
+        if len(nearby) <= len(lines) + 2 or power[lines].max() <= HUM_RATIO * nearby.max():
+            continue
+        top = lines[np.argmax(power[lines])]
+        left, middle, right = np.log(power[top - 1 : top + 2])
+        hertz = frequency[1] * (top + 0.5 * (left - right) / (left - 2.0 * middle + right))
+        waves = [of(2.0 * np.pi * hertz * rows) for of in (np.cos, np.sin)]
+        heights = np.linalg.lstsq(np.stack([*map(bent, waves)], axis=1), bent(force))[0]
+        force = force - heights @ waves
+        size = recording.file_unit("force").text(float(np.hypot(*heights)))
+        notes.append(
+            f"A hum of {hertz:.4g} Hz with an amplitude of {size} was subtracted from the force: it comes "
+            "from the mains; ground the sensor, and shield its cable."
+        )
+    return (replace(recording, force=force) if notes else recording), notes
