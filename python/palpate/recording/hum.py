@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._typing import Float1D
+from .._typing import Float1D, Float2D
+from .checks.wrong_readings import repeated_rows
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -31,6 +32,7 @@ MOST_OF_RATE = 0.4
 """Highest frequency of a hum that is searched [share of the rate of the rows]."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
 def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     """Returns a recording with the hum subtracted from its force, and a note on each line of it.
 
@@ -40,8 +42,9 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     periodically are as high as their neighbours. Recordings without time, or with more pauses than rows, are
     returned as they are.
     """
-    rows, step = recording.time, recording.sample_period
-    if rows is None or step is None or not np.ptp(rows) < 2.0 * step * len(rows):
+    measured = recording.without(repeated_rows(recording))
+    rows, step = measured.time, measured.sample_period
+    if recording.time is None or rows is None or step is None or not np.ptp(rows) < 2.0 * step * len(rows):
         return recording, []
     time = np.arange(rows[0], rows[-1], step)
     if len(time) < 3:
@@ -51,7 +54,7 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     def bent(values: Float1D) -> Float1D:
         return taper * np.diff(np.interp(time, rows, values), 2)
 
-    power = np.abs(np.fft.rfft(bent(recording.force))) ** 2
+    power = np.abs(np.fft.rfft(bent(measured.force))) ** 2
     frequency = np.fft.rfftfreq(len(taper), step)
     force, notes = recording.force, []
     for hertz in sorted(
@@ -60,17 +63,23 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
         distance, width = np.abs(frequency - hertz), 2.0 * frequency[1]
         nearby = power[(distance > MAINS_TOLERANCE * hertz + width) & (distance < MAINS_HZ[0] / 4.0)]
         lines = np.flatnonzero(distance <= MAINS_TOLERANCE * hertz + width / 2.0)
-        if len(nearby) <= len(lines) + 2 or power[lines].max() <= HUM_RATIO * nearby.max():
+        if len(nearby) <= len(lines) + 2 or not power[lines].max() > HUM_RATIO * nearby.max():
             continue
         top = lines[np.argmax(power[lines])]
         left, middle, right = np.log(power[top - 1 : top + 2])
         hertz = frequency[1] * (top + 0.5 * (left - right) / (left - 2.0 * middle + right))
-        waves = [of(2.0 * np.pi * hertz * rows) for of in (np.cos, np.sin)]
-        heights = np.linalg.lstsq(np.stack([*map(bent, waves)], axis=1), bent(force))[0]
-        force = force - heights @ waves
+        seen = np.stack([bent(each) for each in _waves(hertz, rows)], axis=1)
+        heights = np.linalg.lstsq(seen, bent(measured.force))[0]
+        force = force - heights @ _waves(hertz, recording.time)
         size = recording.file_unit("force").text(float(np.hypot(*heights)))
         notes.append(
             f"A hum of {hertz:.4g} Hz with an amplitude of {size} was subtracted from the force: it comes "
             "from the mains; ground the sensor, and shield its cable."
         )
     return (replace(recording, force=force) if notes else recording), notes
+
+
+def _waves(hertz: float, time: Float1D) -> Float2D:
+    """Returns cosine and sine (2, n) of a line at each time (n,)."""
+    phase = 2.0 * np.pi * hertz * time
+    return np.stack([np.cos(phase), np.sin(phase)])
