@@ -113,8 +113,8 @@ class Judged:
 
     @property
     def changed(self) -> float:
-        """Mean square of the force [force^2] that a zero or an object that changes explains of the residual:
-        a term that is harder to render must explain more. 0 if nothing changes."""
+        """Share of the squared residual that a zero or an object that changes explains [-]: a term that is
+        harder to render must explain more. 0 if nothing changes."""
         return self.cause.explained if self.cause is not None and self.cause.by in (FIRST, LATER) else 0.0
 
     @property
@@ -147,7 +147,7 @@ class Cause:
     share: float
     """Share of the squared difference that it explains [-]"""
     explained: float
-    """Mean square of the force that it explains [force^2]"""
+    """Share of the squared residual of all passages that it explains [-]"""
     noticed: float
     """Change of the force by it, without its random part, in just noticeable differences"""
 
@@ -256,11 +256,14 @@ class _Strokes:
         """(m,) mean weight of the rows of each passage"""
         return np.bincount(self.passage, self.weight) / np.bincount(self.passage)
 
+    def mean(self, values: Float1D) -> Float1D:
+        """Returns the weighted means (m,) of values (k,) in each passage."""
+        return np.bincount(self.passage, self.weight * values) / np.bincount(self.passage, self.weight)
+
     def centred(self, values: Float1D) -> Float1D:
         """Returns the weighted means (m,) of values (k,) in each passage, minus their weighted mean at each
         place and direction."""
-        mean = np.bincount(self.passage, self.weight * values) / np.bincount(self.passage, self.weight)
-        place = self.group[self.first]
+        mean, place = self.mean(values), self.group[self.first]
         return np.asarray(mean - means_at(place, self.share, mean)[0][place])
 
     def within(self, weighted: Float1D) -> Float1D:
@@ -316,6 +319,7 @@ def _cause_of(best: Judged) -> Cause | None:
             tables.append((sentence, value, span, table))
     fits = [each @ np.linalg.lstsq(each, residual, rcond=LEAST_MOMENT)[0] for *_, each in tables]
     before = float(residual @ residual)
+    whole = float(np.sum(strokes.share * strokes.mean(best.residual[strokes.rows] ** 2)))
     if not fits or not before > 0.0:
         return None
     left = [float(np.sum((residual - effect) ** 2)) for effect in fits]
@@ -340,8 +344,8 @@ def _cause_of(best: Judged) -> Cause | None:
         speed = "" if data.parts else ", the speed"
         text = sentence.format(way_of_change, amount, pinched=best.pinched, speed=speed)
         criterion = deviance("bic", max(rss, TINY * before), n, table.shape[1])
-        explained = (before - rss) / float(np.sum(strokes.share))
-        found.append((criterion, Cause(text, sentence, 1.0 - rss / before, explained, noticed)))
+        cause = Cause(text, sentence, 1.0 - rss / before, (before - rss) / whole, noticed)
+        found.append((criterion, cause))
     found = [each for each in found if each[1].perceptible] or found
     least = min(criterion for criterion, _ in found)
     if least >= deviance("bic", before, n, 0):

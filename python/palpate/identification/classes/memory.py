@@ -354,7 +354,7 @@ def _with_memory(
     judged = judged_network(found, found.rows) if found.shows_all(recordings) else None
     first = first_strokes(judged) if judged else None
     moved = judged.changed if judged and first is None else 0.0
-    before = max(compared.rmse**2 - moved, TINY) / recorded.spread**2
+    before = max(compared.rmse**2 * (1.0 - moved), TINY) / recorded.spread**2
     in_sample = 1.0 - _rms(choice.fit.error(choice.shape), compared.balance) ** 2 / before
     over_velocity = "velocity" in found.inputs
     if in_sample < LEAST_GAIN and not over_velocity:
@@ -387,7 +387,7 @@ def _with_memory(
     if len(refined.log_yield):
         # Waits do not change a branch that slips, and a play operator keeps its state without contact.
         error = max(where_sure, of_all)
-        before = max(compared.rmse_where_sure**2 - moved, TINY) / recorded.spread**2
+        before = max(compared.rmse_where_sure**2 * (1.0 - moved), TINY) / recorded.spread**2
     # A network of velocity, which is as hard to render, is not preferred to a memory that is good in motion.
     allowed = USABLE_NRMSE * recorded.spread if over_velocity else 0.0
     if where_sure**2 > max((1.0 + LEAST_GAIN) * compared.rmse_where_sure**2, allowed**2):

@@ -167,7 +167,7 @@ def velocity(selection: ClassSelection, below: Candidate) -> Candidate:
         before, unknown = before * unshifted, unknown * unshifted
         compared = f"{compared} with shifted strokes"
     if judged.changed:
-        before -= judged.changed * float(np.sum(below.fit_weight))
+        before, unknown = before * (1.0 - judged.changed), unknown * (1.0 - judged.changed)
         compared = f"{compared} and a zero or an object that changes"
     share = 1.0 - (after + unknown) / before if before > 0.0 else 0.0
     change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"

@@ -77,6 +77,15 @@ def test_known_branches_are_found(tau: list[float]) -> None:
     assert not any("not fitted" in line for line in model.notes["rows"]), "a memory fits all rows"
 
 
+def test_strokes_that_change_by_relaxation_do_not_hide_it() -> None:
+    """Most rows wait, so that the strokes alone differ by more than the error over all rows."""
+    time, position = ramps_and_holds(37)
+    truth = relaxing([2.0], [2.9])
+    model = palpate.identify(position, with_noise(truth.force_over_time(time, position)[0], 0.01), time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [2.9], rtol=0.02)
+
+
 def pressed_twice() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns time, position and a wave of the force at rest of an object pressed twice at one speed."""
     time = np.arange(1200) / 1000.0
