@@ -186,7 +186,12 @@ Method = Callable[[Sequence[Recording]], Callable[[Recording], Array]]
 
 def with_memory(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
     model = palpate.identify(recordings)
-    return lambda recording: palpate.verify(model, recording).force
+
+    def predict(recording: Recording) -> Array:
+        check, time = palpate.verify(model, recording), recording.time_or_row
+        return np.interp(time, time[check.rows], check.force)
+
+    return predict
 
 
 def of_position(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:

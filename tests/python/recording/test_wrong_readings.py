@@ -271,6 +271,19 @@ def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> 
     assert f": row {row}: {force:g} at " in note
 
 
+@pytest.mark.parametrize("begin", [1, 2])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_fast_ramp_beside_a_hold_has_no_wrong_position(begin: int, reverse: bool) -> None:
+    hold, ramp = np.full(100, 0.128), np.linspace(0.128, 1.0, 300)
+    x = np.concatenate([[0.0, 0.08][:begin], hold, ramp])
+    y = np.concatenate([[-0.03, 0.43][:begin], 0.45 + 0.24 * np.exp(-np.arange(100) / 12.0), 0.45 + ramp])
+    if reverse:
+        x, y = x[::-1], y[::-1]
+    assert wrong_rows(x, y) == []
+    first = np.flatnonzero(x < 0.1)
+    assert wrong_rows(x, np.where(x < 0.1, 0.69, y)) == first.tolist()
+
+
 @pytest.mark.parametrize(
     "at",
     [{0: -3.0}, {799: 3.0}, {399: 0.0}, {399: 8.0}, {100: 8.0}],

@@ -85,7 +85,8 @@ def wrong_readings(
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
     row nearby; one step of the display is not a wrong reading, and no row of a peak over several rows is one.
     Several of them side by side are outside the range of all others. At the largest and smallest positions a
-    wall may be touched by a single row. Rows that are not in the order of a motion have no neighbours, and
+    wall may be touched by a single row. A position in the first or last rows is right if the force there
+    deviates as well. Rows that are not in the order of a motion have no neighbours, and
     none is wrong. `motion` (m,) is the position of all rows in recorded order, of which these rows can be a
     part.
 
@@ -101,6 +102,11 @@ def wrong_readings(
     if residual is None:
         for values in (position, *inputs):
             found |= _deviating(values, values, position, ~found, at_ends=True)
+        for end in np.s_[:NEIGHBOUR_ROWS], np.s_[-NEIGHBOUR_ROWS:]:
+            if found[end].any():  # a motion that begins or ends at speed changes the force as well
+                given = ~found
+                given[end] = True
+                found[end] &= not (found & _deviating(force, force, position, given, at_ends=True))[end].any()
     found |= _deviating(force if residual is None else residual, force, position, ~found, at_ends=False)
     if residual is None:
         found |= _of_one_value(force, found) & (position < position.max())
