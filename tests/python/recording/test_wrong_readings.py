@@ -273,7 +273,7 @@ def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> 
 
 @pytest.mark.parametrize("begin", [1, 2])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_fast_ramp_beside_a_hold_has_no_wrong_position(begin: int, reverse: bool) -> None:
+def test_a_fast_ramp_before_or_after_a_hold_has_no_wrong_position(begin: int, reverse: bool) -> None:
     hold, ramp = np.full(100, 0.128), np.linspace(0.128, 1.0, 300)
     x = np.concatenate([[0.0, 0.08][:begin], hold, ramp])
     y = np.concatenate([[-0.03, 0.43][:begin], 0.45 + 0.24 * np.exp(-np.arange(100) / 12.0), 0.45 + ramp])
