@@ -39,7 +39,8 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     The second difference of the force over time is compared, in which the motion has as much power at low
     frequencies as at high ones; a Hann window keeps each line apart from the others. A line must be higher
     than all others within a quarter of the frequency of the mains: the lines of an object that is pressed
-    periodically are as high as their neighbours. Recordings without time, or with more pauses than rows, are
+    periodically are as high as their neighbours. If the position has the line as well, the tool moves, and the
+    force is that of the object. Recordings without time, or with more pauses than rows, are
     returned as they are.
     """
     measured = recording.without(repeated_rows(recording))
@@ -54,16 +55,21 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     def bent(values: Float1D) -> Float1D:
         return taper * np.diff(np.interp(time, rows, values), 2)
 
-    power = np.abs(np.fft.rfft(bent(measured.force))) ** 2
+    power, of_position = (
+        np.abs(np.fft.rfft(bent(each))) ** 2 for each in (measured.force, measured.position)
+    )
     frequency = np.fft.rfftfreq(len(taper), step)
     force, notes = recording.force, []
     for hertz in sorted(
         {each for mains in MAINS_HZ for each in np.arange(mains, MOST_OF_RATE / step, mains)}
     ):
         distance, width = np.abs(frequency - hertz), 2.0 * frequency[1]
-        nearby = power[(distance > MAINS_TOLERANCE * hertz + width) & (distance < MAINS_HZ[0] / 4.0)]
         lines = np.flatnonzero(distance <= MAINS_TOLERANCE * hertz + width / 2.0)
-        if len(nearby) <= len(lines) + 2 or not power[lines].max() > HUM_RATIO * nearby.max():
+        nearby = (distance > MAINS_TOLERANCE * hertz + width) & (distance < MAINS_HZ[0] / 4.0)
+        if np.count_nonzero(nearby) <= len(lines) + 2:
+            continue
+        hums, moves = (each[lines].max() > HUM_RATIO * each[nearby].max() for each in (power, of_position))
+        if moves or not hums:
             continue
         top = lines[np.argmax(power[lines])]
         left, middle, right = np.log(power[top - 1 : top + 2])

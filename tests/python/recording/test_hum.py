@@ -56,6 +56,17 @@ def test_a_hum_becomes_no_ripple_of_the_model(hertz: float, height: float) -> No
     assert any("hum" in each for each in check.notes)
 
 
+def test_a_tool_that_oscillates_with_50_hz_has_no_hum() -> None:
+    recording = pressed()
+    assert recording.time is not None
+    trembling = recording.position + 2e-5 * np.sin(2.0 * np.pi * 50.0 * recording.time)
+    force = recording.force + 250.0 * (trembling - recording.position)
+    shaken = palpate.Recording.from_arrays(trembling, force, recording.time)
+    still = palpate.Recording.from_arrays(recording.position, force, recording.time)
+    assert without_hum(shaken) == (shaken, [])
+    assert len(without_hum(still)[1]) == 1
+
+
 def test_each_line_of_a_hum_is_subtracted() -> None:
     noisy, clean = pressed((60.0, 0.05), (120.0, 0.02), (180.0, 0.03)), pressed()
     quiet, notes = without_hum(noisy)
