@@ -39,9 +39,9 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     The second difference of the force over time is compared, in which the motion has as much power at low
     frequencies as at high ones; a Hann window keeps each line apart from the others. A line must be higher
     than all others within a quarter of the frequency of the mains: the lines of an object that is pressed
-    periodically are as high as their neighbours. If the position has the line as well, the tool moves, and the
-    force is that of the object. Recordings without time, or with more pauses than rows, are
-    returned as they are.
+    periodically are as high as their neighbours. If the position has the line as well, the tool moves, and
+    the force is that of the object. Recordings without time, or with more pauses than rows, are returned as
+    they are.
     """
     measured = recording.without(repeated_rows(recording))
     rows, step = measured.time, measured.sample_period
