@@ -19,9 +19,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from pygments.lexers import CppLexer
-from pygments.token import Token
-
 MOST_WORDS = 40
 """Largest number of words in a sentence"""
 
@@ -100,6 +97,11 @@ _NAME_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _FORBIDDEN_NAMES = {word: instead for words, instead in NAMES.items() for word in words.split()}
 _FORBIDDEN = [(re.compile(rf"\b(?:{pattern})\b", re.I), instead) for pattern, instead in INSTEAD.items()]
 _OPENINGS = [(re.compile(pattern, re.I), instead) for pattern, instead in OPENINGS.items()]
+_CPP_TOKEN = re.compile(
+    r'//[^\n]*|/\*.*?\*/|#\s*include[^\n]*|(?P<string>R"(\w*)\(.*?\)\2"|"(?:\\.|[^"\\])*")'
+    r"|'(?:\\.|[^'\\])*'|[^\W\d]\w*|\d[\w.']*|\S",
+    re.S,
+)
 _SENTENCE_END = re.compile(r"(?<=[.!?;:])\s+(?=[\"'`(]?[A-Z0-9`])|\n\s*\n|\n\s*[-*|]\s|\n\s*\d+\.\s")
 _LIST = re.compile(r"\w+(?: \([^()]*\))?(?:, (?:and )?\w+(?: \([^()]*\))?){4,}")
 _SCRIPT = re.compile(r"\s*#!|^\s*(?:set -\w+|sleep [\d.]+|cd \S+)$", re.M)
@@ -125,10 +127,10 @@ def python_texts(file: Path) -> Iterator[Text]:
         if token.type == tokenize.COMMENT and "SPDX" not in token.string:
             lines.append((token.start[0], token.string.lstrip("#: ")))
     yield from _joined(file, lines)
-    tree = ast.parse(source)
+    nodes = list(ast.walk(ast.parse(source)))
     documentation: set[int] = set()
     names: dict[str, int] = {}
-    for node in ast.walk(tree):
+    for node in nodes:
         body = getattr(node, "body", None)
         for each in body if isinstance(body, list) else []:
             value = each.value if isinstance(each, ast.Expr) else None
@@ -139,7 +141,7 @@ def python_texts(file: Path) -> Iterator[Text]:
             names.setdefault(name, node.lineno)
     yield from _names(file, names)
     inside: set[int] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.JoinedStr):
             inside.update(id(part) for part in ast.walk(node) if part is not node)
             words = "".join(
@@ -183,22 +185,22 @@ def cpp_texts(file: Path) -> Iterator[Text]:
     source = file.read_text(encoding="utf-8")
     lines: list[tuple[int, str]] = []
     names: dict[str, int] = {}
-    message, started, line = "", 0, 1
-    for kind, value in CppLexer().get_tokens(source):
-        if kind in Token.Comment.Single and "SPDX" not in value:
+    message, started, line, end = "", 0, 1, 0
+    for token in _CPP_TOKEN.finditer(source):
+        value, line, end = token[0], line + source.count("\n", end, token.start()), token.start()
+        if token["string"]:
+            started, message = started or line, message + value
+            continue
+        if message and "#include" not in message:
+            yield from _message(file, started, message.replace('"', "").replace("\\n", "\n"))
+        message, started = "", 0
+        if value.startswith("//") and "SPDX" not in value:
             # A comment after a member of a C++ class is not joined with the comment in the next line.
             lines.append((-line if value.startswith("///<") else line, value.lstrip("/<! ").rstrip()))
-        elif kind in Token.Comment.Multiline:
+        elif value.startswith("/*"):
             lines += [(line + at, each.strip("/* ")) for at, each in enumerate(value.splitlines())]
-        if kind in Token.Literal.String:
-            started, message = started or line, message + value
-        elif message and value.strip():
-            if "#include" not in message:
-                yield from _message(file, started, message.replace('"', "").replace("\\n", "\n"))
-            message, started = "", 0
-        if kind in Token.Name:
+        elif value.isidentifier():
             names.setdefault(value, line)
-        line += value.count("\n")
     yield from _joined(file, lines)
     for found in re.finditer(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*\w+,\s*(\w+)\)", source, re.M):
         line = names.pop(found[1], source.count("\n", 0, found.start()) + 1)
