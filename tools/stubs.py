@@ -18,6 +18,13 @@ MODULE = "palpate._core"
 PACKAGE = Path(__file__).parents[1] / "python" / "palpate"
 ALLOW_LIST = Path(__file__).with_name("stubtest_allowlist.txt")
 SCHEMA = "model/model.schema.json"
+STUBS_ONLY = f"""[mypy]
+follow_imports = skip
+follow_imports_for_stubs = true
+[mypy-{MODULE}.*]
+follow_imports = normal
+"""
+"""Settings for reading the stubs of the module alone; `mypy` checks the types that they use from NumPy"""
 STRUCTURES = re.compile(r'(?<="Structure": {"enum": )\[.*?\]')
 LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
@@ -66,8 +73,10 @@ def main() -> int:
     # The generated stubs use the type stubs of NumPy, which are complete from Python 3.11 on.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOW_LIST)]
+        command += ["--mypy-config-file", "mypy.ini"]
         # In another folder, because its options invalidate the cache of mypy.
         with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "mypy.ini").write_text(STUBS_ONLY, encoding="utf-8")
             return subprocess.run(command, cwd=folder, check=False).returncode
     return 0
 
