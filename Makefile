@@ -49,7 +49,8 @@ python := .venv/bin/python
 alone := flock .venv/pip.lock
 pip := $(alone) $(python) -m pip
 # Exact versions with their SHA-256, and no package that runs its own build; tools/lock.sh writes the files.
-install_locked := $(pip) install --quiet --require-hashes --only-binary :all: --requirement
+# Python compiles a module when it is first imported, and most modules of these packages never are.
+install_locked := $(pip) install --quiet --no-compile --require-hashes --only-binary :all: --requirement
 # Two runs of apt-get must not overlap either.
 system_packages := flock Makefile tools/system_packages.sh "$(PYTHON)"
 stamps := .venv/stamps
@@ -116,9 +117,9 @@ test: | setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# Each process starts with a part of the files in their order, so that the tests of a file share its fixtures. One process
-# more than processors, because tests wait for programs that they start.
-parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist worksteal
+# Each process starts with a part of the files in their order, so that the tests of a file share its fixtures. Each imports
+# all tests, so more processes than processors take longer.
+parallel_pytest = $(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist worksteal
 test-python: setup control
 	$(parallel_pytest)
 
