@@ -81,7 +81,7 @@ class ExportedModelOf : public testing::TestWithParam<Precision> {};
 
 TEST_P(ExportedModelOf, EveryRandomModelAndStructureIsWithinItsProvedBounds) {
     Random random{17};
-    for (int k = 0; k < cases(60); ++k) {
+    for (int k = 0; k < cases(20, 60); ++k) {
         const ForceModel model = random_model(random);
         Scheme scheme = random_scheme(random, model);
         ExportTarget target = random_target(random, GetParam());

@@ -123,7 +123,7 @@ TEST(AdmittanceInequalities, NeedIsTheSumOverTheStepResponse) {
 
 TEST(AdmittanceInequalities, LargestNeedIsAboveEverySampleAndNearTheLargest) {
     std::mt19937_64 random{7};
-    for (int k = 0; k < test::cases(200); ++k) {
+    for (int k = 0; k < test::cases(50, 200); ++k) {
         const bench::Scene scene = bench::random_scene(random, 1.0);
         const AdmittanceNeed need{scene.device, step_slope(scene.structure, scene.object.bounds())};
         const double T = scene.device.period_s;
@@ -141,7 +141,7 @@ TEST(AdmittanceInequalities, LargestNeedIsAboveEverySampleAndNearTheLargest) {
 
 TEST(AdmittanceInequalities, MusclesTakeNoEnergyOutOfACertifiedDisplay) {
     std::mt19937_64 random{11};
-    for (int k = 0; k < test::cases(100); ++k) {
+    for (int k = 0; k < test::cases(25, 100); ++k) {
         const bench::Scene scene = bench::random_scene(random, 1.0);
         for (const auto muscles :
              {bench::Muscles::Noise, bench::Muscles::Sine, bench::Muscles::AgainstMotion}) {
@@ -182,7 +182,7 @@ TEST(AdmittanceInequalities, ImplicitStepGivesNoEnergyToAMassBetweenTwoStops) {
 
 TEST(AdmittanceInequalities, ChosenObjectIsCertifiedAndLessDampingIsNot) {
     std::mt19937_64 random{5};
-    for (int k = 0; k < test::cases(30); ++k) {
+    for (int k = 0; k < test::cases(8, 30); ++k) {
         const bench::Scene scene = bench::random_scene(random, 1.0);
         const ForceBounds bounds = scene.object.bounds();
         for (const StructureKind kind :

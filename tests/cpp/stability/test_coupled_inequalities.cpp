@@ -487,7 +487,7 @@ TEST(CoupledLines, StiffestCouplingUsesItsShareOfTheDamping) {
 TEST(CoupledAccount, OptimisedMotionsTakeNoEnergyOutOfCertifiedScenes) {
     test::Random random{41};
     int tried = 0;
-    while (tried < test::cases(200)) {
+    while (tried < test::cases(40, 200)) {
         CoupledScene scene = random_scene(random, random() % 3 == 0);
         if (!set_damping(scene, 1.0)) {
             continue;
