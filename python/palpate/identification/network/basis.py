@@ -170,7 +170,7 @@ class Resolution:
         return np.random.default_rng(0).choice(self._positions, MOST_DISTANCES, replace=False)
 
     @cached_property
-    def _tree(self) -> scipy.spatial.cKDTree:
+    def _tree(self) -> "scipy.spatial.cKDTree":
         return scipy.spatial.cKDTree(self._compared)
 
     def _around(self, places: Float2D, count: int) -> Float1D:
