@@ -46,7 +46,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         pytest.param(
             ["show", "a.csv", "--plot", "p.png", "--plot-frame", "frame.png"], marks=pytest.mark.full
         ),
-        ["demo", "-o", "new"],
+        pytest.param(["demo", "-o", "new"], marks=pytest.mark.full),
     ],
 )
 def test_ctrl_c_while_the_last_figure_is_drawn_writes_nothing(

@@ -32,12 +32,7 @@ RELAXING = {"switch_springs/linear_housing_tx_short_45g.csv": "relaxation"}
 
 @pytest.mark.parametrize(
     "name",
-    sampled(
-        base_names(),
-        "sample",
-        "sweeps",
-        "vhb4910_viscoelastic/loadunload_rate_0d05_1d5_1.csv",
-    ),
+    sampled(base_names(), "sample", "sweeps"),
 )
 def test_a_clean_recording_gets_the_verdict_good_unless_its_force_changes_in_a_wait(name: str) -> None:
     found = clean_outcome(name)

@@ -429,6 +429,7 @@ def test_rows_of_a_contact_with_a_preload_stay(seed: int) -> None:
     assert not any("wrong" in each for each in model.notes["rows"])
 
 
+@pytest.mark.full
 def test_the_largest_forces_of_the_fastest_press_of_a_relaxing_object_stay() -> None:
     random, corners = np.random.default_rng(3), [(0.0, -1.2)]
     stiffness, tau = np.array([0.117, 0.05]), np.array([0.52, 5.9])

@@ -89,6 +89,7 @@ def test_a_row_at_rest_at_the_largest_position_belongs_to_the_last_place() -> No
     assert model(0.01 * np.arange(360.0), x, force).verdict.level == "good"
 
 
+@pytest.mark.full
 def test_rows_between_which_the_tool_turns_do_not_change_the_position_of_the_turn() -> None:
     """Seven times faster, the row behind a turn is further from the turn."""
     random, time = np.random.default_rng(2), 0.0025 * np.arange(1820.0)

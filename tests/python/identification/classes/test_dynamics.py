@@ -466,6 +466,7 @@ def late_position() -> Recording:
     return Recording.from_arrays(1e-3 * late, force + noise, time=time)
 
 
+@pytest.mark.full
 def test_turns_alone_show_neither_the_force_between_constant_speeds_nor_a_mass() -> None:
     """A network over position and velocity was 5 N wrong at a speed between those of the recording."""
     model = identify(late_position())

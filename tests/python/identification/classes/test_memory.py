@@ -416,6 +416,7 @@ def test_a_pad_that_the_tool_leaves_gets_a_memory() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.02 * np.ptp(force[held])
 
 
+@pytest.mark.full
 def test_a_mirrored_pad_gets_the_error_of_the_model_that_is_returned() -> None:
     time, x, force = left_pad()
     model = palpate.identify(-x, -force, time=time)
@@ -455,6 +456,7 @@ def test_rows_that_wait_count_at_most_as_much_as_those_that_move() -> None:
     assert (balanced(~moving) == 1.0).all()
 
 
+@pytest.mark.full
 def test_strokes_that_differ_are_found_in_the_residual_of_the_memory() -> None:
     time, position = ramps_and_holds(1, 0.04)
     force = relaxing([2.0], [0.7]).force_over_time(time, position)[0] * (1.0 + 0.1 * time / time[-1])
@@ -475,6 +477,7 @@ def test_a_zero_that_drifts_is_not_a_branch_that_slips() -> None:
     assert "compared with a zero or an object that changes" in str(model.notes["model_selection"])
 
 
+@pytest.mark.full
 def test_an_object_that_softens_has_no_branches_that_slip() -> None:
     """Without the first press the force is a loop of friction, with a smaller error than that of branches."""
     random = np.random.default_rng(1)
@@ -501,6 +504,7 @@ def test_a_large_rise_of_the_error_is_stated_as_a_multiple() -> None:
     assert text == "raises the squared error on held-out sections to 571 times"
 
 
+@pytest.mark.full
 def test_a_network_of_velocity_is_judged_in_the_waits() -> None:
     """Limits of the slope exclude a memory."""
     time, x, force = left_pad()
