@@ -117,9 +117,9 @@ test: | setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# Each process starts with a part of the files in their order, so that the tests of a file share its fixtures. Each imports
-# all tests, so more processes than processors take longer.
-parallel_pytest = $(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist worksteal
+# Each process starts with a part of the files in their order, so that the tests of a file share its fixtures. One process
+# more than processors, because tests wait for programs that they start.
+parallel_pytest = $(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist worksteal
 test-python: setup control
 	$(parallel_pytest)
 
