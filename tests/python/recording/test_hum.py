@@ -75,6 +75,12 @@ def test_each_line_of_a_hum_is_subtracted() -> None:
     assert np.std(quiet.force - clean.force) < 0.001
 
 
+def test_the_mains_and_the_clock_of_a_long_recording_may_deviate() -> None:
+    quiet, notes = without_hum(pressed((49.82, 0.04), presses=10))
+    assert len(notes) == 1
+    assert np.std(quiet.force - pressed(presses=10).force) < 0.002
+
+
 def test_a_recording_without_hum_is_returned_as_it_is() -> None:
     for recording in (pressed(), pressed(noise=0.0), pressed((47.0, 0.05), (55.0, 0.02)), pressed(presses=8)):
         assert without_hum(recording) == (recording, [])
