@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from ..errors import InputError, command_word, did_you_mean, listed, nearest_name, shortened
 from .looks import NO_LOOK, Look
+from .rows import direction_of
 from .units import (
     CLOCK,
     FORCE_UNITS,
@@ -52,6 +53,9 @@ ROLES = (POSITION, FORCE, TIME)
 LAWS = (("m", "N"), ("rad", "N*m"))
 """SI units of position and force between which an object has a law. A count or a current can be
 either."""
+
+OF_BOTH_STROKES = "of press and release"
+"""End of a problem with a table that has press and release side by side"""
 
 DIRECTION_NAMES = ("direction", "segment", "richtung", "sens", "stroke")
 """Names of columns, in lower case, that can state the direction of the stroke in another way than by words
@@ -379,10 +383,18 @@ def _choose(
             return alone[0]
     found = [column.name for group in best for column in group]
     count = len(found)
+    if [_way(name) for name in found] in ([1, -1], [-1, 1]):
+        problems[role.name] = f"{listed(found)} are the {role.name} {OF_BOTH_STROKES}"
+        return None
     problems[role.name] = (
         f"{_NUMBER_WORDS.get(count, count)} columns could be the {role.name} ({listed(found)})"
     )
     return None
+
+
+def _way(name: str) -> int | None:
+    """Returns the direction that one word of a name states; None without such a word."""
+    return next(filter(None, map(direction_of, re.findall(r"[^\W\d_]+", name))), None)
 
 
 def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
@@ -428,6 +440,11 @@ def _cure(
     A unit is assumed only for a column whose name states none. Where a name states something that is not a
     unit of the role, the user fills in the unit.
     """
+    if any(text.endswith(OF_BOTH_STROKES) for text in problems.values()):
+        return (
+            ". Write the rows of the release below those of the press, with the words press and release in a "
+            "column direction"
+        )
     no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)

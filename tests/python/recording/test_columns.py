@@ -111,8 +111,18 @@ FORCE_SYMBOLS = "such as N, gf or N*m"
             "The columns are a_mm, b_mm, load cell, start_s, stop_s. If load cell is in N, add: "
             "--position a_mm --force 'load cell' --units 'load cell=N' --time start_s",
         ),
+        (
+            "Travel up (mm),Force up (N),Travel down (mm),Force down (N)",
+            "press.csv: Travel up (mm), Travel down (mm) are the position of press and release; "
+            "Force up (N), Force down (N) are the force of press and release. "
+            "Write the rows of the release below those of the press, with the words press and release in a "
+            "column direction",
+        ),
     ],
-    ids=["two positions", "three forces", "two times", "no unit", "no force unit", "three problems"],
+    ids=[
+        *("two positions", "three forces", "two times", "no unit", "no force unit", "three problems"),
+        "both strokes",
+    ],
 )
 def test_a_refusal_names_all_problems_and_one_command(header: str, sentence: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(sentence)}$"):
