@@ -28,9 +28,6 @@ HUM_RATIO = 4.0
 """Power of a line above which it is a hum [largest power of the frequencies nearby, which the object and the
 noise have]."""
 
-MOST_OF_RATE = 0.4
-"""Highest frequency of a hum that is searched [share of the rate of the rows]."""
-
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
 def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
@@ -58,14 +55,14 @@ def without_hum(recording: Recording) -> tuple[Recording, list[str]]:
     power, of_position = (
         np.abs(np.fft.rfft(bent(each))) ** 2 for each in (measured.force, measured.position)
     )
-    frequency = np.fft.rfftfreq(len(taper), step)
+    frequency, around = np.fft.rfftfreq(len(taper), step), MAINS_HZ[0] / 4.0
     force, notes = recording.force, []
     for hertz in sorted(
-        {each for mains in MAINS_HZ for each in np.arange(mains, MOST_OF_RATE / step, mains)}
+        {each for mains in MAINS_HZ for each in np.arange(mains, 0.5 / step - around, mains)}
     ):
         distance, width = np.abs(frequency - hertz), 2.0 * frequency[1]
         lines = np.flatnonzero(distance <= MAINS_TOLERANCE * hertz + width / 2.0)
-        nearby = (distance > MAINS_TOLERANCE * hertz + width) & (distance < MAINS_HZ[0] / 4.0)
+        nearby = (distance > MAINS_TOLERANCE * hertz + width) & (distance < around)
         if np.count_nonzero(nearby) <= len(lines) + 2:
             continue
         hums, moves = (each[lines].max() > HUM_RATIO * each[nearby].max() for each in (power, of_position))
