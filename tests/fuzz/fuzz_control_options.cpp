@@ -58,7 +58,7 @@ void check(const RenderOptions& options) {
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(control_options) {
     using namespace palpate;
     static fuzz::Silence silence;
     std::cout.rdbuf(&silence);

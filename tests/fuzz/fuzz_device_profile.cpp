@@ -29,7 +29,7 @@ palpate::DeviceProfile profile_of(std::string_view text) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(device_profile) {
     using palpate::fuzz::require;
     palpate::fuzz::Input input{data, size};
     try {

@@ -103,7 +103,7 @@ constexpr void (*models[])(Input&){ALL_MODELS(RUN, RUN)};
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(exported_model) {
     palpate::fuzz::Input input{data, size};
     palpate::fuzz::models[input.take<std::uint8_t>() % std::size(palpate::fuzz::models)](input);
     return 0;

@@ -213,7 +213,7 @@ class Device {
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(firmware) {
     palpate::fuzz::Input input{data, size};
     palpate::fuzz::Device device{input};
     while (!input.empty()) {

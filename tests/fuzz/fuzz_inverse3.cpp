@@ -9,7 +9,7 @@
 #include "fuzzing.hpp"
 #include "palpate/device/inverse3_messages.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(inverse3) {
     using palpate::fuzz::require;
     palpate::fuzz::Input input{data, size};
     const int axis = input.take<std::uint8_t>() % 3;

@@ -66,7 +66,7 @@ void check_force(const ForceModel& model) {
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(model_file) {
     using namespace palpate;
     fuzz::Input input{data, size};
     try {

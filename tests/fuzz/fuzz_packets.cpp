@@ -105,7 +105,7 @@ void run(Input& input) {
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(packets) {
     palpate::fuzz::Input input{data, size};
     palpate::fuzz::run(input);
     return 0;

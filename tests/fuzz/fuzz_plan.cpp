@@ -35,7 +35,7 @@ void check_plan(const ModelFile& read, const Json& content) {
 }  // namespace
 }  // namespace palpate::fuzz
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(plan) {
     using namespace palpate;
     fuzz::Input input{data, size};
     try {

@@ -35,7 +35,7 @@ void read(WebSocketFrames& frames, std::string_view bytes, Read& all) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(web_socket) {
     palpate::fuzz::Input input{data, size};
     const std::size_t piece = 1 + input.take<std::uint8_t>() % 32;
     const std::string_view bytes = input.take_text();

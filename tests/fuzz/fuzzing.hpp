@@ -7,11 +7,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <span>
 #include <string_view>
 #include <type_traits>
 
-/// Check and input of all fuzz targets. Each target defines LLVMFuzzerTestOneInput, which libFuzzer calls with every input.
+/// Check and input of all fuzz targets.
 namespace palpate::fuzz {
 
 /// Ends the program if `holds` is false; libFuzzer then stores the input.
@@ -52,6 +53,25 @@ class Input {
     std::span<const std::uint8_t> bytes_;
 };
 
+/// A target, which is called with each input.
+using Target = int (*)(const std::uint8_t* data, std::size_t size);
+
+/// Returns the targets of this program by their names; replay.cpp calls them.
+inline std::map<std::string_view, Target>& targets() {
+    static std::map<std::string_view, Target> all;
+    return all;
+}
+
 }  // namespace palpate::fuzz
 
+/// Begins the function of a target with the input `data` of `size` bytes. A program of libFuzzer has one target, and the
+/// program that reads the seeds has all.
+#ifdef PALPATE_REPLAY
+#define FUZZ_TARGET(name)                                                                              \
+    static int name##_target(const std::uint8_t* data, std::size_t size);                              \
+    static const bool name##_is_known = palpate::fuzz::targets().emplace(#name, name##_target).second; \
+    static int name##_target(const std::uint8_t* data, std::size_t size)
+#else
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+#define FUZZ_TARGET(name) extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
+#endif

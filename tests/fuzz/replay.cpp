@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls a fuzz target with each file of a folder, in a build without libFuzzer: fuzz_TARGET FOLDER.
+// Calls a fuzz target with each file of the folder of its seeds, in a build without libFuzzer: fuzz_replay FOLDER.
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -8,20 +8,23 @@
 #include <iterator>
 #include <vector>
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+#include "fuzzing.hpp"
 
 int main(int count, char** words) {
-    if (count != 2) {
-        std::cerr << "Usage: " << words[0] << " FOLDER\n";
+    const std::filesystem::path folder{count == 2 ? words[1] : ""};
+    const std::string name = folder.filename().string();
+    const auto target = palpate::fuzz::targets().find(name);
+    if (target == palpate::fuzz::targets().end()) {
+        std::cerr << "Usage: " << words[0] << " FOLDER, which has the name of a target\n";
         return 2;
     }
     std::size_t inputs = 0;
-    for (const auto& entry : std::filesystem::directory_iterator(words[1])) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
         std::ifstream file{entry.path(), std::ios::binary};
         const std::vector<std::uint8_t> input{std::istreambuf_iterator<char>{file}, {}};
         std::cout << entry.path().filename().string()
                   << std::endl;  // the last name is that of an input that fails
-        LLVMFuzzerTestOneInput(input.data(), input.size());
+        target->second(input.data(), input.size());
         ++inputs;
     }
     return inputs > 0 ? 0 : 1;
