@@ -70,8 +70,10 @@ LEAST_MOMENT = 1e-6
 errors"""
 
 
-def places_of(box: Float2D, side: NDArray[Any] | None, places: int = PLACES) -> NDArray[np.intp]:
-    """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
+def places_of(box: Float2D, side: NDArray[Any] | None, places: int | None = None) -> NDArray[np.intp]:
+    """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box, of 2 PLACES
+    by default."""
+    places = PLACES if places is None else places
     place = np.minimum((box[:, 0] * places).astype(np.intp), places - 1)
     return place if side is None else place + places * (side < 0)
 
