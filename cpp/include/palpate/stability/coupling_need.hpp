@@ -19,24 +19,22 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the maximum over all frequencies theta = 2 phi of a non-negative trigonometric polynomial of degree N. By
-/// Bernstein's inequality the maximum is at most 1 / (1 - (N h)^2 / 8) times the largest of the values at frequencies
-/// with the spacing h. The result is at least the true maximum, and exceeds it by at most a share of 2e-6.
+/// Returns the larger one of `least` and the maximum over all frequencies theta = 2 phi of a non-negative trigonometric
+/// polynomial of degree N. By Bernstein's inequality the maximum is at most 1 / (1 - (N h)^2 / 8) times the largest of
+/// the values at frequencies with the spacing h. The result is at least the true value, and exceeds it by at most a
+/// share of 2e-6. A few frequencies show whether the maximum can exceed `least`.
 template <class Polynomial>
-[[nodiscard]] double largest_over_frequencies(int degree, Polynomial polynomial) noexcept {
-    const int points = 1024 * degree;
-    double largest = 0.0;
-    for (int k = 0; k <= points; ++k) {
-        largest = std::max(largest, polynomial(0.5 * std::numbers::pi * k / points));
-    }
-    const double spacing = std::numbers::pi / points * degree;
-    return largest / (1.0 - spacing * spacing / 8.0);
-}
-
-/// Returns sin((n + 1) phi) / sin(phi), whose absolute value is that of 1 + z^-1 + ... + z^-n at the frequency theta =
-/// 2 phi, z = e^(j theta).
-[[nodiscard]] inline double sum_of_delays(int whole, double phi) noexcept {
-    return phi > 0.0 ? std::sin((whole + 1) * phi) / std::sin(phi) : whole + 1.0;
+[[nodiscard]] double largest_over_frequencies(int degree, double least, Polynomial polynomial) noexcept {
+    const auto most = [&](int of_degree) {
+        const int points = of_degree * degree;
+        double largest = 0.0;
+        for (int k = 0; k <= points; ++k) {
+            largest = std::max(largest, polynomial(0.5 * std::numbers::pi * k / points));
+        }
+        const double spacing = std::numbers::pi / of_degree;
+        return largest / (1.0 - spacing * spacing / 8.0);
+    };
+    return most(32) <= least ? least : std::max(least, most(1024));
 }
 
 /// Returns the largest damping needed by any delay up to n + tau samples (n = `whole`, tau = `fraction`). need(n, phi)
@@ -46,14 +44,13 @@ template <class Polynomial>
 template <class Need>
 [[nodiscard]] double need_up_to(int whole, double fraction, Need need) noexcept {
     double largest = 0.0;
-    for (int n = 1; n <= whole; ++n) {
-        largest =
-            std::max(largest, largest_over_frequencies(n + 1, [&](double phi) { return need(n, phi); }));
-    }
     if (fraction > 0.0) {
-        largest = std::max(largest, largest_over_frequencies(whole + 2, [&](double phi) {
-                               return (1.0 - fraction) * need(whole, phi) + fraction * need(whole + 1, phi);
-                           }));
+        largest = largest_over_frequencies(whole + 2, largest, [&](double phi) {
+            return (1.0 - fraction) * need(whole, phi) + fraction * need(whole + 1, phi);
+        });
+    }
+    for (int n = whole; n > 0; --n) {
+        largest = largest_over_frequencies(n + 1, largest, [&](double phi) { return need(n, phi); });
     }
     return largest;
 }
@@ -80,14 +77,17 @@ template <class Need>
         return std::numeric_limits<double>::infinity();
     }
     return std::max(held, detail::need_up_to(whole, fraction, [&](int n, double phi) {
+                        // |1 + z^-1 + ... + z^-n| is sin((n + 1) phi) / sin(phi)
                         const double sine = std::sin(phi);
+                        const double cosine = std::cos(phi);
+                        const double sine_n = std::sin(n * phi);
+                        const double cosine_n = std::cos(n * phi);
+                        const double sum = phi > 0.0 ? sine_n * cosine / sine + cosine_n : n + 1.0;
                         const double real = stiffness + 2.0 * damping * sine * sine;
-                        const double imaginary = damping * std::sin(2.0 * phi);
-                        const double sum = detail::sum_of_delays(n, phi);
-                        const double square =
-                            sum * sum * (real * real + imaginary * imaginary) -
-                            2.0 * falling * sum * (real * std::cos(n * phi) + imaginary * std::sin(n * phi)) +
-                            falling * falling;
+                        const double imaginary = 2.0 * damping * sine * cosine;
+                        const double square = sum * sum * (real * real + imaginary * imaginary) -
+                                              2.0 * falling * sum * (real * cosine_n + imaginary * sine_n) +
+                                              falling * falling;
                         return 0.5 * falling + 0.5 * square / (2.0 * held - falling);
                     }));
 }
