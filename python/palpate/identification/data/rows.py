@@ -404,11 +404,8 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
 
 
 COVERED_SHARE = 0.95
-"""Share of the travel on which positions must be near each other: a few gaps do not change the resolution."""
-
-USABLE_GAP = 0.05
-"""Width of a gap in the recorded positions above which a periodic model is usable with a reservation [share
-of the repeat length of its force]."""
+"""Share of the travel on which positions must be near each other: a few gaps do not change the resolution. A
+periodic model is usable with a reservation if one gap exceeds the rest of the repeat length of its force."""
 
 UNFIT_GAP = 0.5
 """Width of a gap in the recorded positions above which a periodic model is unfit [share of the repeat length
@@ -434,7 +431,7 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
     widest = int(np.argmax(steps))
     share = float(steps[widest])
     seen = min(resolution_of((position - lower) / travel) * travel, period) / period if travel > 0.0 else 0.0
-    if share - seen <= USABLE_GAP:
+    if share - seen <= 1.0 - COVERED_SHARE:
         return note, []
     start = lower + period * float(box[widest])
     judge = no if share - seen > UNFIT_GAP else usable
