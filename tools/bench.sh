@@ -76,6 +76,7 @@ studies <<END
   identification/repeats.py --json build/bench/repeats.json
   identification/memory.py
   identification/growing_loops.py
+  identification/joints.py --json build/bench/joints.json
   identification/ordinary.py --jobs 1 --json build/bench/ordinary.json
   identification/invariances.py $(full_or_short "" "half_the_rate repeated_rows --draws 1") --jobs 1 --json build/bench/invariances.json
   limits/certificate_table.py build/bench/certificate_search.txt --to $to
