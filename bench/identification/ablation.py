@@ -335,16 +335,24 @@ def of_draw(draw: int, pairs: Sequence[Pair] | None = None) -> Fit:
     return Fit([rows.recording()], Truth.of(rows).error, {})
 
 
+def against(truth: Array, force: Callable[[Model], Array]) -> Callable[[Model], float]:
+    """Returns the error of the forces (n,) of a model, divided by the spread of the true ones."""
+    return lambda model: float(normalised(root_mean_square(force(model) - truth), truth))
+
+
+def _both_strokes(model: Model, at: Array) -> Array:
+    return np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
+
+
 def of_noise(case: str, draw: int) -> Fit:
     """Returns a straight line with noise."""
     recording = CASES[case](draw)
     x = np.linspace(recording.position.min(), recording.position.max(), 1000)
 
-    def error(model: Model) -> float:
-        at_rest = model.predict(np.column_stack([x, 0.0 * x])) if model.of_velocity else model.force(x)
-        return float(normalised(root_mean_square(at_rest - line(x)), line(x)))
+    def at_rest(model: Model) -> Array:
+        return model.predict(np.column_stack([x, 0.0 * x])) if model.of_velocity else model.force(x)
 
-    return Fit([recording], error, {})
+    return Fit([recording], against(line(x), at_rest), {})
 
 
 def joined_to_itself(draw: int) -> Recording:
@@ -392,9 +400,7 @@ def of_stored(stored: Callable[[int], Recording], draw: int) -> Fit:
     recording = stored(draw)
     x = np.linspace(recording.position.min(), recording.position.max(), 1000)
     truth = np.where(x > 0.0, spring_wall(x), 0.0)
-    return Fit(
-        [recording], lambda model: float(normalised(root_mean_square(model.force(x) - truth), truth)), {}
-    )
+    return Fit([recording], against(truth, lambda model: model.force(x)), {})
 
 
 def of_kinks(draw: int) -> Fit:
@@ -419,12 +425,7 @@ def of_preload(draw: int) -> Fit:
     recording = Recording.from_arrays(np.round(x, 2), 10.0 * np.round(10.2 * force))
     at = np.linspace(-9.0, 94.0, 4000)
     truth = 102.0 * np.concatenate([law(at, 1.0), law(at, -1.0)])
-
-    def error(model: Model) -> float:
-        found = np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
-        return float(normalised(root_mean_square(found - truth), truth))
-
-    return Fit([recording], error, {})
+    return Fit([recording], against(truth, lambda model: _both_strokes(model, at)), {})
 
 
 def of_changes(draw: int) -> Fit:
@@ -437,13 +438,8 @@ def of_changes(draw: int) -> Fit:
     noise = random.normal(0.0, 0.01, len(rows))
     recording = Recording.from_arrays(x[rows], force[rows] + noise, time[rows])
     at = np.linspace(0.02, 0.98, 1000)
-
-    def error(model: Model) -> float:
-        found = np.concatenate([model.force(at, direction=np.full(len(at), way)) for way in (1.0, -1.0)])
-        truth = np.concatenate([10.0 * at + 1.0, 10.0 * at - 1.0])
-        return float(normalised(root_mean_square(found - truth), truth))
-
-    return Fit([recording], error, {})
+    truth = np.concatenate([10.0 * at + 1.0, 10.0 * at - 1.0])
+    return Fit([recording], against(truth, lambda model: _both_strokes(model, at)), {})
 
 
 def of_hum(draw: int) -> Fit:
@@ -455,10 +451,7 @@ def of_hum(draw: int) -> Fit:
     hum = height * np.ptp(spring_wall(x)) * np.sin(2.0 * np.pi * (hertz * time + random.uniform()))
     force = spring_wall(x) + random.normal(0.0, 0.002, len(x)) + hum
     at = np.linspace(0.0, 1.0, 1000)
-
-    def error(model: Model) -> float:
-        return float(normalised(root_mean_square(model.force(at) - spring_wall(at)), spring_wall(at)))
-
+    error = against(spring_wall(at), lambda model: model.force(at))
     return Fit([Recording.from_arrays(x, force, time)], error, {})
 
 
@@ -472,11 +465,7 @@ def of_slots(draw: int, turns: int = 1) -> Fit:
 
     recording = Recording.from_arrays(angle, torque(angle) + random.normal(0.0, 0.01, 512))
     between = random.uniform(0.0, 2.0 * np.pi, 1000)
-
-    def error(model: Model) -> float:
-        truth = torque(between)
-        return float(normalised(root_mean_square(model.force(between) - truth), truth))
-
+    error = against(torque(between), lambda model: model.force(between))
     return Fit([recording], error, {"period": 2.0 * np.pi / 7.0} if turns == 1 else {})
 
 
@@ -484,15 +473,17 @@ def of_gap(draw: int) -> Fit:
     """Returns a draw of the bench of ordinary recordings that has no rows in a part of the travel."""
     _, rows = drawn(draw)
     share = (rows.motion.x - rows.motion.x.min()) / np.ptp(rows.motion.x)
-    kept = rows.take(np.flatnonzero((share < LOST[0]) | (share > LOST[1])))
-    return Fit([kept.recording()], Truth.of(rows).error, {})
+    return _part_of(rows, np.flatnonzero((share < LOST[0]) | (share > LOST[1])))
 
 
 def of_fifth_rows(draw: int) -> Fit:
     """Returns every fifth row of a draw of the bench of ordinary recordings."""
     _, rows = drawn(draw)
-    kept = rows.take(np.arange(0, len(rows.force), 5))
-    return Fit([kept.recording()], Truth.of(rows).error, {})
+    return _part_of(rows, np.arange(0, len(rows.force), 5))
+
+
+def _part_of(rows: Any, kept: Any) -> Fit:
+    return Fit([rows.take(kept).recording()], Truth.of(rows).error, {})
 
 
 def of_file(path: Path, name: str) -> Fit:

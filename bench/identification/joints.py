@@ -18,12 +18,11 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.methods import gaussian_process, spline_ridge
+from bench.identification.methods import Array, Predict, gaussian_process, spline_ridge
 from bench.identification.real_data import EVERY, SETS
 from bench.studies import count, markdown_table, measured_data, write_results
 
@@ -32,9 +31,6 @@ from palpate import Recording
 from palpate.baselines import comparable
 from palpate.recording.motion import velocity
 from palpate.verification.metrics import normalised, root_mean_square
-
-Array = NDArray[np.float64]
-Predict = Callable[[Array], Array]
 
 MOST_ROWS = 800
 """Largest number of rows of a Gaussian process."""

@@ -37,13 +37,12 @@ template <class Polynomial>
     return most(32) <= least ? least : std::max(least, most(1024));
 }
 
-/// Returns the largest damping needed by any delay up to n + tau samples (n = `whole`, tau = `fraction`). need(n, phi)
-/// is the damping needed by n whole samples of delay at the frequency 2 phi. During the first part tau of a sample, the
-/// applied force has a delay of n + 1 samples, afterwards of n samples. At each frequency the needed damping is
-/// therefore (1 - tau) need(n) + tau need(n + 1).
+/// Returns the larger one of `largest` and the damping needed by any delay up to n + tau samples (n = `whole`, tau =
+/// `fraction`). need(n, phi) is the damping needed by n whole samples of delay at the frequency 2 phi. During the first
+/// part tau of a sample, the applied force has a delay of n + 1 samples, afterwards of n samples. At each frequency the
+/// needed damping is therefore (1 - tau) need(n) + tau need(n + 1).
 template <class Need>
-[[nodiscard]] double need_up_to(int whole, double fraction, Need need) noexcept {
-    double largest = 0.0;
+[[nodiscard]] double need_up_to(int whole, double fraction, double largest, Need need) noexcept {
     if (fraction > 0.0) {
         largest = largest_over_frequencies(whole + 2, largest, [&](double phi) {
             return (1.0 - fraction) * need(whole, phi) + fraction * need(whole + 1, phi);
@@ -76,20 +75,20 @@ template <class Need>
     if (!(falling <= stiffness + damping)) {
         return std::numeric_limits<double>::infinity();
     }
-    return std::max(held, detail::need_up_to(whole, fraction, [&](int n, double phi) {
-                        // |1 + z^-1 + ... + z^-n| is sin((n + 1) phi) / sin(phi)
-                        const double sine = std::sin(phi);
-                        const double cosine = std::cos(phi);
-                        const double sine_n = std::sin(n * phi);
-                        const double cosine_n = std::cos(n * phi);
-                        const double sum = phi > 0.0 ? sine_n * cosine / sine + cosine_n : n + 1.0;
-                        const double real = stiffness + 2.0 * damping * sine * sine;
-                        const double imaginary = 2.0 * damping * sine * cosine;
-                        const double square = sum * sum * (real * real + imaginary * imaginary) -
-                                              2.0 * falling * sum * (real * cosine_n + imaginary * sine_n) +
-                                              falling * falling;
-                        return 0.5 * falling + 0.5 * square / (2.0 * held - falling);
-                    }));
+    return detail::need_up_to(whole, fraction, held, [&](int n, double phi) {
+        // |1 + z^-1 + ... + z^-n| is sin((n + 1) phi) / sin(phi)
+        const double sine = std::sin(phi);
+        const double cosine = std::cos(phi);
+        const double sine_n = std::sin(n * phi);
+        const double cosine_n = std::cos(n * phi);
+        const double sum = phi > 0.0 ? sine_n * cosine / sine + cosine_n : n + 1.0;
+        const double real = stiffness + 2.0 * damping * sine * sine;
+        const double imaginary = 2.0 * damping * sine * cosine;
+        const double square = sum * sum * (real * real + imaginary * imaginary) -
+                              2.0 * falling * sum * (real * cosine_n + imaginary * sine_n) +
+                              falling * falling;
+        return 0.5 * falling + 0.5 * square / (2.0 * held - falling);
+    });
 }
 
 /// Returns gamma: the largest error of the rendered force divided by the position error of the encoder that causes it
