@@ -19,4 +19,5 @@ def test_a_spring_with_damping_is_compared_on_held_out_rows(monkeypatch: pytest.
     assert list(found) == ["palpate", *methods]
     level = 0.01 / float(np.std(force))
     assert 0.8 * level < found["palpate"] < 1.2 * level
-    assert found["palpate"] < found["splines"] < found["boosted trees"] < 0.2
+    assert found["palpate"] < found["splines"] < 1.2 * level  # with the velocity
+    assert found["splines"] < found["boosted trees"] < 0.2
